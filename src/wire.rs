@@ -15,7 +15,7 @@ use crate::drive::{half_from_words, half_to_words};
 use crate::frames::{Abc, Angle};
 use crate::identification::Observation;
 use crate::modulation::CarrierHalf;
-use crate::operator::{self, Feedback, LineTimes, Status, Told, TrainLimits};
+use crate::operator::{self, DemandWords, Feedback, LineTimes, Status, TrainLimits};
 use crate::ports::{DriveCommand, Report, Sample};
 use crate::protection::{Fault, SafeState};
 use crate::protocol::Frame;
@@ -228,19 +228,19 @@ fn line_from_words([present, precharge, discharge]: [u32; 3]) -> Option<LineTime
 }
 
 /// A status and a frame, one after the other.
-fn told_to_words<T: Told>(status: &Status<T>, frame: Option<Frame>) -> [u32; 12] {
+fn told_to_words<T: DemandWords>(status: &Status<T>, frame: Option<Frame>) -> [u32; 12] {
     let [a, b, c, d, e, f, g, h, i] = status.to_words();
     let [head, low, high] = frame.to_words();
     [a, b, c, d, e, f, g, h, i, head, low, high]
 }
 
 /// The block of [`Request::Tell`], or of [`DualRequest::Tell`].
-pub fn told_to_block<T: Told>(from: Instant, status: &Status<T>, frame: Option<Frame>) -> Block {
+pub fn told_to_block<T: DemandWords>(from: Instant, status: &Status<T>, frame: Option<Frame>) -> Block {
     block(12, from, &told_to_words(status, frame))
 }
 
 /// The inverse of [`told_to_words`].
-fn told_from_words<T: Told>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame>)> {
+fn told_from_words<T: DemandWords>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame>)> {
     let [a, b, c, d, e, f, g, h, i, head, low, high, ..] = words;
     Some((Status::from_words([a, b, c, d, e, f, g, h, i])?, Option::from_words([head, low, high])))
 }

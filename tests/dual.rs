@@ -407,8 +407,8 @@ fn messages_arrive_as_they_were_sent() {
         release: 200,
     };
     assert_eq!(DualCommand::from_words(command.to_words()), command);
-    let share = MotorShare { depth: 0.4, angle: Angle(6) };
-    for next in [None, Some([share, MotorShare { depth: 0.3, ..share }])] {
+    let share = MotorShare { modulation_index: 0.4, angle: Angle(6) };
+    for next in [None, Some([share, MotorShare { modulation_index: 0.3, ..share }])] {
         let applied = DualApplied { at: Instant(3), next, trip: Some(trip), released: 7 };
         assert_eq!(DualApplied::from_words(applied.to_words()), applied);
     }

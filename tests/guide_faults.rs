@@ -58,16 +58,16 @@ fn code() -> String {
 
 /// The parts between commas, up to the bracket that closes more than was opened.
 fn parts(text: &str) -> Vec<&str> {
-    let (mut depth, mut from, mut parts) = (0, 0, Vec::new());
+    let (mut modulation_index, mut from, mut parts) = (0, 0, Vec::new());
     for (at, letter) in text.char_indices() {
         match letter {
-            '(' | '[' | '{' => depth += 1,
-            ')' | ']' | '}' | ';' if depth == 0 => {
+            '(' | '[' | '{' => modulation_index += 1,
+            ')' | ']' | '}' | ';' if modulation_index == 0 => {
                 parts.push(text[from..at].trim());
                 break;
             }
-            ')' | ']' | '}' => depth -= 1,
-            ',' if depth == 0 => {
+            ')' | ']' | '}' => modulation_index -= 1,
+            ',' if modulation_index == 0 => {
                 parts.push(text[from..at].trim());
                 from = at + 1;
             }

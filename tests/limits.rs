@@ -7,8 +7,8 @@ use tractive::control::{Demand, Measurements};
 use tractive::frames::{Abc, AlphaBeta, Angle};
 use tractive::machine::Ratings;
 use tractive::protection::{
-    DiodeWatch, Fault, FrozenWatch, INNOVATION_RAD, LegFaults, LinkLimits, OpenGates, SafeState, Trip,
-    Violation, check_angle, check_currents, check_demand, check_known, check_measurements, check_speed,
+    DiodeWatch, FailedCheck, Fault, FrozenWatch, INNOVATION_RAD, LegFaults, LinkLimits, OpenGates, SafeState,
+    Trip, check_angle, check_currents, check_demand, check_known, check_measurements, check_speed,
     check_undervoltage, safe_state, trip_from_words, trip_to_words,
 };
 use tractive::time::Instant;
@@ -17,14 +17,14 @@ const RATINGS: &Ratings = &BUILT_IN.ratings;
 const PERIOD_S: f32 = 1e-4;
 
 /// The limit itself is allowed, and the next number above it is not.
-fn most(limit: f32, fault: Fault, check: impl Fn(f32) -> Option<Violation>) {
+fn most(limit: f32, fault: Fault, check: impl Fn(f32) -> Option<FailedCheck>) {
     assert_eq!(check(limit), None, "{limit}");
     let beyond = limit.next_up();
     assert_eq!(check(beyond), Some((fault, beyond, limit)));
 }
 
 /// The same for the next number below.
-fn least(limit: f32, fault: Fault, check: impl Fn(f32) -> Option<Violation>) {
+fn least(limit: f32, fault: Fault, check: impl Fn(f32) -> Option<FailedCheck>) {
     assert_eq!(check(limit), None, "{limit}");
     let beyond = limit.next_down();
     assert_eq!(check(beyond), Some((fault, beyond, limit)));
@@ -285,7 +285,7 @@ fn frozen_after(
     (before_v, voltage_v): (f32, f32),
     omega: f32,
     turns: bool,
-) -> Option<(u32, Violation)> {
+) -> Option<(u32, FailedCheck)> {
     let mut watch = FrozenWatch::new();
     let mut angle = Angle::ZERO;
     let currents_a = Abc { a, b: -0.5 * a, c: -0.5 * a };
@@ -324,7 +324,7 @@ fn an_angle_that_stands_is_found_in_its_time() {
 #[test]
 fn currents_that_repeat_are_found_in_their_time() {
     let periods = |a, volts, omega| frozen_after(a, volts, omega, true).map(|(periods, _)| periods);
-    let value = |a, volts, omega| frozen_after(a, volts, omega, true).map(|(_, violation)| violation);
+    let value = |a, volts, omega| frozen_after(a, volts, omega, true).map(|(_, failed)| failed);
     // Too small to be suspicious: 5 % of the largest.
     let least_a = 0.05 * RATINGS.max_current_a;
     assert_eq!(periods(least_a, (0.0, 0.0), 400.0), None);

@@ -17,13 +17,13 @@ fn rate(hz: f32) -> f32 {
     hz * 4_294_967_296.0 / 25e6
 }
 
-/// Steps through halves with references drawn by the test: depth, Hz, V.
+/// Steps through halves with references drawn by the test: modulation index, Hz, V.
 fn by_halves(references: &[(f32, f32, f32)]) -> Vec<CarrierHalf> {
     let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
     let (mut now, mut angle) = (Instant(u32::MAX - 1_000_000), Angle::ZERO);
     let mut halves = Vec::new();
-    for (depth, hz, udc_v) in references {
-        let voltage_v = depth * udc_v * std::f32::consts::FRAC_2_PI;
+    for (modulation_index, hz, udc_v) in references {
+        let voltage_v = modulation_index * udc_v * std::f32::consts::FRAC_2_PI;
         let reference = Reference::turning(voltage_v, angle, rate(*hz), now, *udc_v);
         let half = modulator.step(now, Some(&reference));
         now = now.after(half.period_ticks);
@@ -60,9 +60,9 @@ proptest! {
     }
 
     #[test]
-    fn nonsense_makes_no_endless_half(voltage in any::<f32>(), rate in any::<f32>(), udc in any::<f32>(), depth in any::<f32>()) {
+    fn nonsense_makes_no_endless_half(voltage in any::<f32>(), rate in any::<f32>(), udc in any::<f32>(), modulation_index in any::<f32>()) {
         let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
-        let reference = Reference { depth, ..Reference::turning(voltage, Angle(77), rate, Instant(0), udc) };
+        let reference = Reference { modulation_index, ..Reference::turning(voltage, Angle(77), rate, Instant(0), udc) };
         for k in 0..10 {
             let half = modulator.step(Instant(k * 10_000), Some(&reference));
             prop_assert!(half.period_ticks >= 1 && half.period_ticks <= 4 * devices().shortest_half_ticks);
@@ -114,9 +114,14 @@ fn mean_voltage_of_every_carrier_half_is_the_reference() {
 
 /// The centre of a pattern's flux in the turn after its first half, in parts of the fundamental flux. Begun at
 /// `begin` turns with an EMF of a share of the voltage, `lead` turns ahead of it.
-fn centre_after_catch((mode, hz, depth): (Mode, f32, f32), begin: f32, share: f32, lead: f32) -> f64 {
+fn centre_after_catch(
+    (mode, hz, modulation_index): (Mode, f32, f32),
+    begin: f32,
+    share: f32,
+    lead: f32,
+) -> f64 {
     const UDC_V: f32 = 1500.0;
-    let voltage_v = depth * UDC_V * std::f32::consts::FRAC_2_PI;
+    let voltage_v = modulation_index * UDC_V * std::f32::consts::FRAC_2_PI;
     let omega = f64::from(hz) * std::f64::consts::TAU;
     let asked = |volts: f32, turns: f32, now: Instant| {
         let angle = Angle::from_turns(turns) + Angle((f64::from(rate(hz)) * f64::from(now.0)) as u64 as u32);
@@ -191,13 +196,13 @@ fn moved_by_a_switch(hz: f32, before: f32, after: f32) -> (Mode, Mode, f64) {
     let mut next = Mode::Off;
     for number in 0..400 {
         // The voltage changes with the mode, which is announced.
-        let depth = if number < 200 || next == halves[199].0 { before } else { after };
+        let modulation_index = if number < 200 || next == halves[199].0 { before } else { after };
         let turned = Angle((f64::from(rate(hz)) * f64::from(now.0)) as u64 as u32);
-        let voltage_v = depth * UDC_V * std::f32::consts::FRAC_2_PI;
+        let voltage_v = modulation_index * UDC_V * std::f32::consts::FRAC_2_PI;
         let reference = Reference::turning(voltage_v, turned, rate(hz), now, UDC_V);
         let beyond = 0.02 * (after - before).signum();
         let wanted = if number < 200 { before - beyond } else { after + beyond };
-        let half = modulator.step(now, Some(&Reference { depth: wanted, ..reference }));
+        let half = modulator.step(now, Some(&Reference { modulation_index: wanted, ..reference }));
         next = half.ahead[0];
         halves.push((half.mode, flux));
         let [a, b, c] = half.on_ticks(0).map(|on| f64::from(on) / 25e6 * f64::from(UDC_V));

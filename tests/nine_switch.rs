@@ -185,9 +185,9 @@ impl Draw {
     }
 }
 
-fn motor(angle_deg: f64, depth: f64) -> MotorVoltage {
+fn motor(angle_deg: f64, modulation_index: f64) -> MotorVoltage {
     let units = (angle_deg / 360.0).rem_euclid(1.0) * 4_294_967_296.0;
-    MotorVoltage { angle: Angle(units.round() as u64 as u32), depth: depth as f32 }
+    MotorVoltage { angle: Angle(units.round() as u64 as u32), modulation_index: modulation_index as f32 }
 }
 
 fn degrees(motor: MotorVoltage) -> f64 {
@@ -208,7 +208,7 @@ fn span(angle_deg: f64) -> f64 {
 fn shortest(motor: MotorVoltage) -> f64 {
     let mut phases = phases(degrees(motor));
     phases.sort_by(f64::total_cmp);
-    0.25 * f64::from(motor.depth) * (phases[1] - phases[0]).min(phases[2] - phases[1])
+    0.25 * f64::from(motor.modulation_index) * (phases[1] - phases[0]).min(phases[2] - phases[1])
 }
 
 /// The largest phase and the smallest.
@@ -223,16 +223,18 @@ fn without_shoot_through(request: &Request) -> Seen {
     // Those applied: a request that fits within rounding has lost some 1e-7 of its voltage.
     let applied = step(request).unwrap().applied;
     let mut request = Request { shoot_through: 0.0, ..*request };
-    (request.upper.depth, request.lower.depth) = (applied.upper_depth, applied.lower_depth);
+    (request.upper.modulation_index, request.lower.modulation_index) =
+        (applied.upper_index, applied.lower_index);
     look(&step(&request).unwrap()).unwrap()
 }
 
 /// Distance of the mean vectors from those wanted, in shares of the link voltage.
 fn voltage_error(seen: &Seen, wanted: [(f64, f64); 2]) -> f64 {
     let mut worst = 0.0_f64;
-    for (mean, (angle_deg, depth)) in seen.means().into_iter().zip(wanted) {
+    for (mean, (angle_deg, modulation_index)) in seen.means().into_iter().zip(wanted) {
         let (sin, cos) = angle_deg.to_radians().sin_cos();
-        worst = worst.max((mean[0] - 0.5 * depth * cos).hypot(mean[1] - 0.5 * depth * sin));
+        worst =
+            worst.max((mean[0] - 0.5 * modulation_index * cos).hypot(mean[1] - 0.5 * modulation_index * sin));
     }
     worst
 }
@@ -251,7 +253,7 @@ fn voltages_and_shoot_through_are_what_was_asked_for() {
             assert!(period.applied.feasible(), "{request:?}");
             assert_eq!(step(&request), Ok(period));
             let seen = look(&period).unwrap_or_else(|e| panic!("{e}: {request:?}"));
-            let wanted = [request.upper, request.lower].map(|m| (degrees(m), f64::from(m.depth)));
+            let wanted = [request.upper, request.lower].map(|m| (degrees(m), f64::from(m.modulation_index)));
             voltage = voltage.max(voltage_error(&seen, wanted));
             duty = duty.max((seen.shorted() - f64::from(request.shoot_through)).abs());
             assert!(seen.shorted_at_once() <= 1, "{request:?}");
@@ -375,7 +377,8 @@ fn zero_time_and_shoot_through_are_divided_as_the_scheme_says() {
         let mut draw = Draw(scheme as u64 + 41);
         for _ in 0..CASES / 4 {
             let request = draw.within(scheme, 0.99);
-            let spans = [request.upper, request.lower].map(|m| span(degrees(m)) * f64::from(m.depth));
+            let spans =
+                [request.upper, request.lower].map(|m| span(degrees(m)) * f64::from(m.modulation_index));
             // Zero time of both motors: half the period each, less the half span.
             let zeros = spans.map(|span| 0.5 - 0.5 * span);
             let seen = without_shoot_through(&request);
@@ -402,7 +405,7 @@ fn zero_time_and_shoot_through_are_divided_as_the_scheme_says() {
     }
 }
 
-/// The gates for these depths at the worst angles.
+/// The gates for these indices at the worst angles.
 fn worst(scheme: Scheme, duty: f64, depth1: f64, depth2: f64) -> Period {
     let request = Request {
         scheme,
@@ -429,10 +432,10 @@ fn the_sliding_boundary_shares_what_the_fixed_one_leaves() {
         // One motor may want too much; the other keeps what is its own, and the first has the rest.
         let applied = worst(Scheme::RthdSlide, duty, 5.0, 0.3 * sum).applied;
         assert!(applied.upper_limited && !applied.lower_limited);
-        assert!((f64::from(applied.upper_depth) - 0.7 * sum).abs() < 2e-6);
+        assert!((f64::from(applied.upper_index) - 0.7 * sum).abs() < 2e-6);
         let applied = worst(Scheme::RthdSlide, duty, 5.0, 5.0).applied;
         assert!(applied.upper_limited && applied.lower_limited);
-        assert!((f64::from(applied.lower_depth) - 0.5 * sum).abs() < 2e-6);
+        assert!((f64::from(applied.lower_index) - 0.5 * sum).abs() < 2e-6);
     }
 }
 
@@ -443,12 +446,13 @@ fn what_does_not_fit_is_scaled_and_reported() {
         for _ in 0..CASES {
             let mut request = draw.feasible(scheme);
             let scale = draw.between(0.9, 3.0);
-            for depth in [&mut request.upper.depth, &mut request.lower.depth] {
-                *depth = (f64::from(*depth) * scale) as f32;
+            for modulation_index in [&mut request.upper.modulation_index, &mut request.lower.modulation_index]
+            {
+                *modulation_index = (f64::from(*modulation_index) * scale) as f32;
             }
             let period = step(&request).unwrap();
             let motors = [request.upper, request.lower];
-            let spans = motors.map(|m| span(degrees(m)) * f64::from(m.depth));
+            let spans = motors.map(|m| span(degrees(m)) * f64::from(m.modulation_index));
             let own = 1.0 - f64::from(request.shoot_through);
             let rooms = if scheme == Scheme::RthdSlide {
                 [own.max(2.0 * own - spans[1]), own.max(2.0 * own - spans[0])]
@@ -457,11 +461,14 @@ fn what_does_not_fit_is_scaled_and_reported() {
             };
             let applied = period.applied;
             let given =
-                [(applied.upper_depth, applied.upper_limited), (applied.lower_depth, applied.lower_limited)];
-            for (k, (depth, limited)) in given.into_iter().enumerate() {
-                let fits = motors[k].depth.into();
+                [(applied.upper_index, applied.upper_limited), (applied.lower_index, applied.lower_limited)];
+            for (k, (modulation_index, limited)) in given.into_iter().enumerate() {
+                let fits = motors[k].modulation_index.into();
                 let left = rooms[k] / span(degrees(motors[k]));
-                assert!((f64::from(depth) - left.min(fits)).abs() < 2e-6, "{k} {request:?} {applied:?}");
+                assert!(
+                    (f64::from(modulation_index) - left.min(fits)).abs() < 2e-6,
+                    "{k} {request:?} {applied:?}"
+                );
                 if (spans[k] - rooms[k]).abs() > 3e-6 {
                     assert_eq!(limited, spans[k] > rooms[k], "{k} {request:?} {applied:?}");
                 }
@@ -484,9 +491,9 @@ fn nonsense_is_refused_by_name() {
         shoot_through: 0.1,
     };
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.1] {
-        let with = |motor: MotorVoltage| MotorVoltage { depth: bad, ..motor };
-        assert_eq!(step(&Request { upper: with(good.upper), ..good }), Err(Refused::UpperDepth));
-        assert_eq!(step(&Request { lower: with(good.lower), ..good }), Err(Refused::LowerDepth));
+        let with = |motor: MotorVoltage| MotorVoltage { modulation_index: bad, ..motor };
+        assert_eq!(step(&Request { upper: with(good.upper), ..good }), Err(Refused::UpperIndex));
+        assert_eq!(step(&Request { lower: with(good.lower), ..good }), Err(Refused::LowerIndex));
         assert_eq!(step(&Request { shoot_through: bad, ..good }), Err(Refused::ShootThrough));
     }
     assert_eq!(step(&Request { shoot_through: 1.001, ..good }), Err(Refused::ShootThrough));
@@ -519,18 +526,19 @@ fn legs_know_their_states() {
 }
 
 fn any_request() -> impl Strategy<Value = Request> {
-    let depth = prop_oneof![4 => 0.0..2.0_f32, 1 => Just(0.0), 1 => Just(f32::MAX), 1 => 0.0..1e-6_f32];
+    let modulation_index =
+        prop_oneof![4 => 0.0..2.0_f32, 1 => Just(0.0), 1 => Just(f32::MAX), 1 => 0.0..1e-6_f32];
     let duty = prop_oneof![4 => 0.0..1.0_f32, 1 => Just(0.0), 1 => Just(1.0)];
     // Sector borders and their neighbours too.
     let angle = prop_oneof![
         any::<u32>(),
         (0..24_u64, -2..=2_i32).prop_map(|(k, d)| (((k << 32) / 24) as u32).wrapping_add_signed(d)),
     ];
-    (0..6_usize, angle.clone(), depth.clone(), angle, depth, duty).prop_map(
+    (0..6_usize, angle.clone(), modulation_index.clone(), angle, modulation_index, duty).prop_map(
         |(scheme, angle1, depth1, angle2, depth2, shoot_through)| Request {
             scheme: Scheme::ALL[scheme],
-            upper: MotorVoltage { angle: Angle(angle1), depth: depth1 },
-            lower: MotorVoltage { angle: Angle(angle2), depth: depth2 },
+            upper: MotorVoltage { angle: Angle(angle1), modulation_index: depth1 },
+            lower: MotorVoltage { angle: Angle(angle2), modulation_index: depth2 },
             shoot_through,
         },
     )
@@ -550,8 +558,8 @@ proptest! {
         prop_assert!((seen.shorted() - f64::from(request.shoot_through)).abs() < 1e-6);
         let applied = period.applied;
         prop_assert!(voltage_error(&seen, [
-            (degrees(request.upper), applied.upper_depth.into()),
-            (degrees(request.lower), applied.lower_depth.into()),
+            (degrees(request.upper), applied.upper_index.into()),
+            (degrees(request.lower), applied.lower_index.into()),
         ]) < 1e-6);
         // On a timer: within half a tick each, and as legal.
         let length = f64::from(half_ticks);

@@ -10,7 +10,8 @@ const HALF_TICKS: u32 = 4_000;
 fn any_request() -> impl Strategy<Value = Request> {
     let motor = || {
         let angle = prop_oneof![any::<u32>(), (0..24_u64).prop_map(|k| ((k << 32) / 24) as u32)];
-        (angle, 0.0..1.2_f32).prop_map(|(angle, depth)| MotorVoltage { angle: Angle(angle), depth })
+        (angle, 0.0..1.2_f32)
+            .prop_map(|(angle, modulation_index)| MotorVoltage { angle: Angle(angle), modulation_index })
     };
     let duty = prop_oneof![Just(0.0), 0.0..0.4_f32];
     (0..Scheme::ALL.len(), motor(), motor(), duty).prop_map(|(scheme, upper, lower, shoot_through)| Request {

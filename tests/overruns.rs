@@ -17,7 +17,7 @@ use tractive::protection::{Fault, MaskedFaults, SafeState, Trip};
 use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
-/// Electrical, in rad/s: slow enough for an angle of the next period to be no surprise.
+/// Electrical, in rad/s: slow enough for an angle of the next period to be no innovation.
 const OMEGA: f32 = 84.0;
 /// From here on interrupts go astray.
 const SETTLED: u32 = 2_000_000;

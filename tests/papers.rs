@@ -65,7 +65,7 @@ fn without_resistance() -> Tables {
 
 /// The tables' operating point on a link of 200 V in r/min and N·m, and the flux linkage that the voltage allows there, in Wb.
 fn weakened(rpm: u32, torque_nm: u32, tables: &Tables) -> (OperatingPoint, f64) {
-    let limit = VoltageLimit { udc_v: 200.0, depth: 1.0, filled: false };
+    let limit = VoltageLimit { udc_v: 200.0, modulation_index: 1.0, filled: false };
     let omega = f64::from(rpm) / 60.0 * core::f64::consts::TAU * 4.0;
     let point = operating_point(torque_nm as f32, omega as f32, &limit, tables);
     (point, core::f64::consts::FRAC_2_PI * 200.0 / omega)

@@ -65,7 +65,7 @@ impl Walk {
     fn new(number: u32) -> Self {
         let limits = ModeLimits {
             follows: Regulated::Mean,
-            depth_limit: 0.9,
+            index_limit: 0.9,
             steady_share: 0.95,
             filled: false,
             ripple_share: 0.05,
@@ -100,7 +100,7 @@ impl Walk {
                 1.0..2.0 => Regulated::Fundamental,
                 _ => Regulated::Angle,
             };
-            self.limits.depth_limit = random.within(0.7, 1.0);
+            self.limits.index_limit = random.within(0.7, 1.0);
             self.limits.steady_share = random.within(0.9, 1.0);
             self.limits.ripple_share = random.within(0.01, 0.2);
             (self.limits.filled, self.limits.settled) = (random.is(0.3), random.is(0.7));
@@ -185,7 +185,8 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
             let target = *law.target();
             assert!(made.voltage_v.is_finite(), "{name} {number}, period {period}: {made:?}");
             sum = pin(sum, &[made.voltage_v, made.vector.alpha, made.vector.beta, made.steady_v]);
-            sum = pin(sum, &[made.carrier.alpha, made.carrier.beta, target.torque_nm, target.depth]);
+            sum =
+                pin(sum, &[made.carrier.alpha, made.carrier.beta, target.torque_nm, target.modulation_index]);
             sum = pin(sum, &[target.current.d, target.current.q, target.flux.d, target.flux.q]);
             sum = pin(sum, &[target.voltage_limit_v, target.region as u8 as f32, law.map_scale()]);
             sum = pin(sum, &[law.map_error(), law.flowing_nm(), omega, passed_s]);

@@ -259,7 +259,7 @@ fn frozen_measurements_are_found() {
     found_by_control(Fault::Frozen, 21, |sample, _| {
         sample.currents_a = Abc { a: 50.0, b: -20.0, c: -30.0 };
     });
-    // Too slow for a surprise.
+    // Too slow for an innovation.
     found_at(20.0, Fault::Frozen, 140, |sample, _| {
         sample.angle = Some(Fake::turning(20.0).angle(Instant(SETTLED)));
     });

@@ -49,11 +49,12 @@ fn no_operating_point_is_below_the_limit_and_the_most_torque_is_what_there_is_ab
     for rpm in (0..=24).map(|k| 250.0 * k as f32) {
         for udc_v in [1_000.0, 1_250.0, 1_500.0, 1_800.0] {
             let at = omega(&limited, rpm);
-            for (depth, filled) in [(0.85, false), (1.0, false), (1.0, true)] {
-                let limit = VoltageLimit { udc_v, depth, filled };
+            for (modulation_index, filled) in [(0.85, false), (1.0, false), (1.0, true)] {
+                let limit = VoltageLimit { udc_v, modulation_index, filled };
                 for torque_nm in (-13..=13).map(|k| 100.0 * k as f32) {
                     let point = operating_point(torque_nm, at, &limit, &limited);
-                    let name = format!("{torque_nm} N·m, {rpm} r/min, {udc_v} V, {depth} {filled}");
+                    let name =
+                        format!("{torque_nm} N·m, {rpm} r/min, {udc_v} V, {modulation_index} {filled}");
                     assert!(point.current.d >= LEAST_A, "{name}: {point:?}");
                     assert_eq!(point.flux, flux_linkage(&limited, point.current), "{name}");
                     let given_nm = self::torque_nm(&limited, point.flux, point.current);
@@ -64,7 +65,7 @@ fn no_operating_point_is_below_the_limit_and_the_most_torque_is_what_there_is_ab
             }
             // As much as there is at six-step, of either sign.
             for sign in [1.0, -1.0] {
-                let limit = VoltageLimit { udc_v, depth: 1.0, filled: false };
+                let limit = VoltageLimit { udc_v, modulation_index: 1.0, filled: false };
                 let given = operating_point(sign * 1_235.0, at, &limit, &limited);
                 let most = most_nm(&limited, sign, at, six_step_v(udc_v)).min(1_235.0);
                 worst = worst.max((most - sign * given.torque_nm) / 1_235.0);
@@ -79,7 +80,7 @@ fn no_operating_point_is_below_the_limit_and_the_most_torque_is_what_there_is_ab
         "{below}, {weakened}, {worst}, {off_nm}"
     );
     // A link that is too low for the narrowest circle of the tables.
-    let limit = VoltageLimit { udc_v: 500.0, depth: 1.0, filled: true };
+    let limit = VoltageLimit { udc_v: 500.0, modulation_index: 1.0, filled: true };
     for torque_nm in [-1_235.0, 0.0, 300.0, 1_235.0] {
         let point = operating_point(torque_nm, omega(&limited, 6_000.0), &limit, &limited);
         assert!(point.current.d >= LEAST_A, "{point:?}");
@@ -149,7 +150,7 @@ fn least_of_references<L: ControlLaw>(
 fn references_keep_the_limit_on_their_way_as_well() {
     let way = |follows, filled, settled| ModeLimits {
         follows,
-        depth_limit: 1.0,
+        index_limit: 1.0,
         steady_share: 1.0,
         filled,
         ripple_share: 0.05,
@@ -184,7 +185,7 @@ fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
     let limited = tables(true);
     let limits = ModeLimits {
         follows: Regulated::Mean,
-        depth_limit: 0.9,
+        index_limit: 0.9,
         steady_share: 1.0,
         filled: false,
         ripple_share: 0.05,

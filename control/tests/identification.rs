@@ -120,7 +120,7 @@ struct Outcome {
 /// The limits that the experiment runs within.
 const LIMITS: ModeLimits = ModeLimits {
     follows: Regulated::Mean,
-    depth_limit: 0.906,
+    index_limit: 0.906,
     steady_share: 1.0,
     filled: false,
     ripple_share: 0.05,

@@ -11,8 +11,8 @@ use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
     COMMAND, Command, Content, Counts, ExperimentFrame, FROM_DRIVE, Frame, LIMITS, LINK_LIMITS, LinkLimits,
     Listening, Measured, Message, ObservationFrame, PARAMETER_REQUEST, ParameterAnswer, ParameterRequest,
-    Payload, Receiver, Scales, Session, StatusFrame, TO_DRIVE, TO_ZS9, TemperaturesFrame, Told, TorqueLimits,
-    Zs9Command, Zs9Demands, Zs9Link, Zs9Session, trip_number,
+    Payload, Receiver, Scales, Session, StatusFrame, TO_DRIVE, TO_ZS9, TelemetrySource, TemperaturesFrame,
+    TorqueLimits, Zs9Command, Zs9Demands, Zs9Link, Zs9Session, trip_number,
 };
 
 /// The injuries that a bus, or somebody on it, does to frames.
@@ -232,7 +232,11 @@ pub fn check_session(events: &[Event]) {
             assert!(!(request.enable && age_ms == u32::MAX));
             assert_eq!(session.listening() == Listening::Fresh, is_fresh);
             let mode = Mode::from_code(state as u32 / 16);
-            let told = session.tell(&Told { status: &status(state), measured: &Measured::default(), mode });
+            let told = session.tell(&TelemetrySource {
+                status: &status(state),
+                measured: &Measured::default(),
+                mode,
+            });
             if let Some(frame) = told {
                 let message = FROM_DRIVE.into_iter().find(|message| message.id == frame.id).unwrap();
                 assert!(

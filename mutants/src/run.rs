@@ -86,10 +86,10 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
         .collect();
     // In no order: a run that is stopped is then a sample of all.
     open.sort_by_cached_key(|mutant| drawn(0, mutant));
-    let hunt = Hunt::new(&trials, options.budget, &places.work);
+    let search = Search::new(&trials, options.budget, &places.work);
     let done = AtomicUsize::new(0);
     open.par_iter().with_max_len(1).try_for_each(|mutant| {
-        let (outcome, by) = hunt.of(mutant)?;
+        let (outcome, by) = search.of(mutant)?;
         let count = done.fetch_add(1, Ordering::Relaxed) + 1;
         if count.is_multiple_of(100) {
             eprintln!("mutants: {count} of {} tried", open.len());
@@ -134,7 +134,7 @@ fn learnt(places: &Places, programs: &[Program], longest_s: u64) -> Result<Vec<T
 }
 
 /// The trials, and what is known of them.
-struct Hunt<'a> {
+struct Search<'a> {
     trials: &'a [Trial],
     /// For each mutant the trials that come by it.
     by: HashMap<u32, Vec<usize>>,
@@ -144,7 +144,7 @@ struct Hunt<'a> {
     work: &'a Path,
 }
 
-impl<'a> Hunt<'a> {
+impl<'a> Search<'a> {
     fn new(trials: &'a [Trial], budget: f64, work: &'a Path) -> Self {
         let mut by: HashMap<u32, Vec<usize>> = HashMap::new();
         for (index, trial) in trials.iter().enumerate() {

@@ -5,6 +5,7 @@
 //! is driven and what is to be seen; [`report`] draws it.
 #![forbid(unsafe_code)]
 
+pub mod ablation;
 pub mod analysis;
 pub mod bench;
 #[cfg(unix)]
@@ -66,5 +67,4 @@ pub mod talk;
 pub mod trace;
 pub mod verdict;
 pub mod warmth;
-pub mod without;
 pub mod zs9;

@@ -31,8 +31,8 @@ fn line(fields: &[Field; 6]) -> Result<String> {
     }
     let applied = period.applied;
     cells.push(u8::from(applied.feasible()).to_string());
-    cells.push(applied.upper_depth.to_string());
-    cells.push(applied.lower_depth.to_string());
+    cells.push(applied.upper_index.to_string());
+    cells.push(applied.lower_index.to_string());
     Ok(cells.join(",") + "\n")
 }
 
@@ -40,19 +40,19 @@ fn period(fields: &[Field; 6]) -> Result<Period> {
     let [scheme, theta1, m1, theta2, m2, d_sh] = fields;
     let request = Request {
         scheme: find(scheme)?,
-        upper: MotorVoltage { angle: angle(theta1)?, depth: number(m1, DEPTH)? },
-        lower: MotorVoltage { angle: angle(theta2)?, depth: number(m2, DEPTH)? },
+        upper: MotorVoltage { angle: angle(theta1)?, modulation_index: number(m1, INDEX)? },
+        lower: MotorVoltage { angle: angle(theta2)?, modulation_index: number(m2, INDEX)? },
         shoot_through: number(d_sh, DUTY)?,
     };
     // What is out of its range is for the modulator to say.
     step(&request).map_err(|refused| match refused {
-        Refused::UpperDepth => m1.wrong(DEPTH),
-        Refused::LowerDepth => m2.wrong(DEPTH),
+        Refused::UpperIndex => m1.wrong(INDEX),
+        Refused::LowerIndex => m2.wrong(INDEX),
         Refused::ShootThrough => d_sh.wrong(DUTY),
     })
 }
 
-const DEPTH: &str = "a finite number, 0 or more (single precision)";
+const INDEX: &str = "a finite number, 0 or more (single precision)";
 const DUTY: &str = "a number from 0 to 1";
 
 fn find(field: &Field) -> Result<Scheme> {

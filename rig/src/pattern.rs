@@ -9,7 +9,7 @@ use anyhow::{Result, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::Path;
 use tractive::frames::{Angle, six_step_v};
-use tractive::modulation::{Mode, Modulator, Reference, Schedule, SwitchLimits, depth_limit};
+use tractive::modulation::{Mode, Modulator, Reference, Schedule, SwitchLimits, index_limit};
 use tractive::time::{Clock, Instant};
 
 /// The pattern to make.
@@ -78,7 +78,7 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
         bail!("--cycles {}: must be from 1 to {most} at this frequency", wanted.cycles);
     }
     let six_step_v = wanted.udc_v * core::f64::consts::FRAC_2_PI;
-    let most = f64::from(depth_limit(wanted.mode, rate, &devices)) * six_step_v;
+    let most = f64::from(index_limit(wanted.mode, rate, &devices)) * six_step_v;
     if !wanted.mode.is_whole() && wanted.voltage_v > most * 1.000_001 {
         bail!("--u {}: mode {} gives at most {most:.3} V here", wanted.voltage_v, wanted.mode.name());
     }

@@ -47,7 +47,7 @@ pub fn merged(merged: &Merged, out: &Path) -> Result<()> {
 fn line(point: &Wanted, machine: &Machine) -> String {
     let Wanted { torque_nm, speed_rpm, udc_v } = *point;
     let omega = (speed_rpm * core::f64::consts::TAU / 60.0) as f32 * machine.tables.ratings.pole_pairs;
-    let limit = VoltageLimit { udc_v: udc_v as f32, depth: 1.0, filled: false };
+    let limit = VoltageLimit { udc_v: udc_v as f32, modulation_index: 1.0, filled: false };
     let found = operating_point(torque_nm as f32, omega, &limit, machine.tables);
     let region = found.region.name();
     format!("{torque_nm},{speed_rpm},{udc_v},{},{},{region}", found.current.d, found.current.q)

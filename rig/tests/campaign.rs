@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use tractive::modulation::{Ladder, Mode};
 use tractive::protection::Fault;
+use tractive_rig::ablation::Ablation;
 use tractive_rig::bench::Flaws;
 use tractive_rig::campaign::judge::Verdict;
 use tractive_rig::campaign::{Campaign, Case, Outcome, cases, dual, healthy, report, traction};
 use tractive_rig::scenario::traction::PatternsName;
-use tractive_rig::without::Ablation;
 
 /// The cases whose names have all these words.
 fn named(words: &str) -> Vec<Case> {
@@ -152,8 +152,8 @@ fn a_random_ride_is_the_same_every_time() {
 #[test]
 fn a_random_ride_of_the_zs9_trips_only_where_its_source_is_out_of_range() {
     let drive = dual::Drive::new(None).unwrap();
-    let driven = |ride| drive.ride(ride, Flaws::default(), 1e-3, 0).unwrap();
-    let healthy = healthy::dual::ride(&drive, 2.0, 7);
+    let driven = |cycle| drive.cycle(cycle, Flaws::default(), 1e-3, 0).unwrap();
+    let healthy = healthy::dual::cycle(&drive, 2.0, 7);
     let [a, b] = [0, 1].map(|_| driven(healthy.clone()));
     assert_eq!(format!("{:?}", a.rows), format!("{:?}", b.rows));
     assert!(a.trip.is_none(), "{:?}", a.trip);

@@ -84,13 +84,13 @@ fn every_mode_makes_the_fundamental_that_it_is_asked_for() {
         (Mode::Mid3, 120.0, 4, [0.3, 0.7, 0.9, 0.98]),
         (Mode::Square, 130.0, 4, [1.0, 1.0, 1.0, 1.0]),
     ];
-    for (mode, f1_hz, cycles, depths) in cases {
-        for depth in depths {
-            let wanted = depth * six_step;
+    for (mode, f1_hz, cycles, indices) in cases {
+        for modulation_index in indices {
+            let wanted = modulation_index * six_step;
             let error = Pattern::new(mode, wanted, f1_hz, cycles).fundamental_v() / wanted - 1.0;
-            println!("{} at {depth}: {:.4} %", mode.name(), 100.0 * error);
+            println!("{} at {modulation_index}: {:.4} %", mode.name(), 100.0 * error);
             let bound = if mode == Mode::Square { 1e-3 } else { 3e-3 };
-            assert!(error.abs() < bound, "{} at {depth}: {error}", mode.name());
+            assert!(error.abs() < bound, "{} at {modulation_index}: {error}", mode.name());
         }
     }
 }

@@ -54,7 +54,7 @@ impl Case {
     }
 
     fn point(&self, torque_nm: f64, supply: &Supply, udc_v: f64) -> OperatingPoint {
-        let limit = VoltageLimit { udc_v: udc_v as f32, depth: 1.0, filled: false };
+        let limit = VoltageLimit { udc_v: udc_v as f32, modulation_index: 1.0, filled: false };
         operating_point(torque_nm as f32, supply.omega as f32, &limit, self.machine.tables)
     }
 

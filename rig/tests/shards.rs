@@ -89,7 +89,7 @@ fn random_runs_merge_into_the_bytes_of_one_run() {
 
 #[test]
 fn healthy_driving_merges_into_the_same_bytes() {
-    merges_alike(&Campaign::of("campaign --healthy 0.05", &["rides.csv"]), false);
+    merges_alike(&Campaign::of("campaign --healthy 0.05", &["cycles.csv"]), false);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use tractive::control::Demand;
 use tractive::nine_switch::Scheme;
 use tractive::time::Instant;
 use tractive_rig::bench::{Bench, Flaws, Tick};
-use tractive_rig::campaign::dual::{self, Ridden, Ride, Script};
+use tractive_rig::campaign::dual::{self, CycleResult, DriveCycle, Script};
 use tractive_rig::machine::Machine;
 use tractive_rig::plant::{Plant, PlantSettings, SpeedSource};
 use tractive_rig::run::{CLOCK, Interrupts};
@@ -114,7 +114,7 @@ fn nothing_drifts_however_long_it_drives() {
 
 /// The ZS9's cycle, once in a period: the one motor is led up and down and back in torque control, the other one wants a speed that
 /// reverses, with a load that changes its sign; source and scheme change.
-fn dual_ride(periods: f64) -> Ride {
+fn dual_cycle(periods: f64) -> DriveCycle {
     let (mut speed_rpm, mut torque_nm, mut wanted_rpm, mut load_nm) =
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut course = Course::default();
@@ -131,23 +131,23 @@ fn dual_ride(periods: f64) -> Ride {
         }
     }
     let motors = [Script::Torque { speed_rpm, torque_nm }, Script::Speed { wanted_rpm, load_nm }];
-    Ride { motors, course, duration_s: periods * PERIOD_S }
+    DriveCycle { motors, course, duration_s: periods * PERIOD_S }
 }
 
 const SCHEMES: [Scheme; 4] = [Scheme::S, Scheme::Rs, Scheme::Rthd, Scheme::Zvo];
 const DUAL_STEP_S: f64 = 5e-3;
 
-fn dual_drive(ride: Ride, origin: Tick) -> Ridden {
-    let ridden = dual::Drive::new(None).unwrap().ride(ride, Flaws::default(), DUAL_STEP_S, origin).unwrap();
-    assert!(ridden.trip.is_none(), "{:?} at {} s", ridden.trip, ridden.ended_s);
-    ridden
+fn dual_drive(cycle: DriveCycle, origin: Tick) -> CycleResult {
+    let driven = dual::Drive::new(None).unwrap().cycle(cycle, Flaws::default(), DUAL_STEP_S, origin).unwrap();
+    assert!(driven.trip.is_none(), "{:?} at {} s", driven.trip, driven.ended_s);
+    driven
 }
 
 #[test]
 fn the_wrap_around_changes_nothing_for_the_zs9() {
     let trace = |origin| {
-        let ride = Ride { duration_s: 1.4, ..dual_ride(1.0) };
-        format!("{:?}", dual_drive(ride, origin).rows)
+        let cycle = DriveCycle { duration_s: 1.4, ..dual_cycle(1.0) };
+        format!("{:?}", dual_drive(cycle, origin).rows)
     };
     let plain = trace(0);
     let before = (0.9 * f64::from(CLOCK.ticks_per_s)) as Tick;
@@ -183,7 +183,7 @@ fn dual_figures(rows: &[zs9::trace::Row]) -> Vec<(&'static str, f64)> {
 fn nothing_drifts_however_long_the_zs9_drives() {
     let periods = periods();
     let before = (7.3 * f64::from(CLOCK.ticks_per_s)) as Tick;
-    let rows = dual_drive(dual_ride(periods), WRAP - before).rows;
+    let rows = dual_drive(dual_cycle(periods), WRAP - before).rows;
     let per_period = (PERIOD_S / DUAL_STEP_S).round() as usize;
     let of = |number: usize| dual_figures(&rows[number * per_period..(number + 1) * per_period]);
     let reference = of(1);

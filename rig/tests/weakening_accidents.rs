@@ -3,7 +3,7 @@
 use tractive::modulation::Mode;
 use tractive::protection::{Fault, SafeState};
 use tractive_rig::bench::Flaws;
-use tractive_rig::campaign::traction::{Drive, Ridden, Ride};
+use tractive_rig::campaign::traction::{CycleResult, Drive, DriveCycle};
 use tractive_rig::inject::Injection;
 use tractive_rig::inject::sensor::{AngleFault, CurrentFault};
 use tractive_rig::inject::traction::{Kind, SupplyFault};
@@ -14,16 +14,16 @@ const FULL_NM: f64 = 1235.0;
 /// √3 · 0.448 Wb · 2,513 rad/s: what the diodes rectify at 6,000 r/min.
 const EMF_V: f64 = 1955.0;
 
-fn drive(ride: Ride) -> Ridden {
-    Drive::new(None).unwrap().ride(ride, Flaws::default()).unwrap()
+fn drive(cycle: DriveCycle) -> CycleResult {
+    Drive::new(None).unwrap().cycle(cycle, Flaws::default()).unwrap()
 }
 
-fn steady(speed_rpm: f64, torque: &[(f64, f64)], duration_s: f64) -> Ride {
-    Ride {
+fn steady(speed_rpm: f64, torque: &[(f64, f64)], duration_s: f64) -> DriveCycle {
+    DriveCycle {
         speed: vec![(0.0, speed_rpm)],
         torque: torque.iter().map(|(t_s, torque_nm)| (*t_s, (*torque_nm, false))).collect(),
         duration_s,
-        ..Ride::default()
+        ..DriveCycle::default()
     }
 }
 
@@ -38,14 +38,14 @@ fn injected(kind: Kind) -> Option<Injection<Kind>> {
 
 #[test]
 fn demand_released_in_deep_weakening() {
-    let ridden = drive(steady(6000.0, &[(-0.05, FULL_NM), (0.2, 0.0), (0.4, -FULL_NM), (0.6, 0.0)], 0.8));
-    assert!(ridden.trip.is_none(), "{:?}", ridden.trip);
-    let peaks = ridden.observed.until;
+    let driven = drive(steady(6000.0, &[(-0.05, FULL_NM), (0.2, 0.0), (0.4, -FULL_NM), (0.6, 0.0)], 0.8));
+    assert!(driven.trip.is_none(), "{:?}", driven.trip);
+    let peaks = driven.observed.until;
     println!("{:.0} A, {:.0} V", peaks.current_a, peaks.udc_v);
     assert!(peaks.current_a < TRIP_A && peaks.udc_v < 1800.0, "{peaks:?}");
-    assert!(mean_nm(&ridden.rows, 0.1, 0.2) > 350.0 && mean_nm(&ridden.rows, 0.5, 0.6) < -350.0);
+    assert!(mean_nm(&driven.rows, 0.1, 0.2) > 350.0 && mean_nm(&driven.rows, 0.5, 0.6) < -350.0);
     for end_s in [0.4, 0.8] {
-        let left_nm = mean_nm(&ridden.rows, end_s - 0.05, end_s);
+        let left_nm = mean_nm(&driven.rows, end_s - 0.05, end_s);
         assert!(left_nm.abs() < 15.0, "{left_nm} N·m");
     }
 }
@@ -56,12 +56,12 @@ fn demand_released_in_deep_weakening() {
 fn line_rises_in_square_wave_without_torque() {
     for torque_nm in [FULL_NM, -FULL_NM] {
         let line = vec![(0.0, 1500.0), (0.5, 1660.0)];
-        let ridden = drive(Ride { line, ..steady(4370.0, &[(-0.05, torque_nm), (0.2, 0.0)], 0.7) });
-        let before = ridden.rows.iter().find(|row| row.t_s > 0.49).map(|row| row.mode);
-        let current_a = ridden.observed.until.current_a;
+        let driven = drive(DriveCycle { line, ..steady(4370.0, &[(-0.05, torque_nm), (0.2, 0.0)], 0.7) });
+        let before = driven.rows.iter().find(|row| row.t_s > 0.49).map(|row| row.mode);
+        let current_a = driven.observed.until.current_a;
         println!("{before:?}, {current_a:.0} A");
         assert_eq!(before, Some(Mode::Square));
-        assert!(ridden.trip.is_none() && current_a < 0.8 * TRIP_A, "{:?}", ridden.trip);
+        assert!(driven.trip.is_none() && current_a < 0.8 * TRIP_A, "{:?}", driven.trip);
     }
 }
 
@@ -73,19 +73,20 @@ fn sensor_lost_in_weakening() {
         (Kind::Current(1, CurrentFault::Open), [Fault::PhaseSum, Fault::Overcurrent]),
     ] {
         for torque_nm in [FULL_NM, -FULL_NM] {
-            let ride = Ride { injection: injected(kind), ..steady(6000.0, &[(-0.05, torque_nm)], 0.4) };
-            let ridden = drive(ride);
-            let trip = ridden.trip.unwrap();
+            let cycle =
+                DriveCycle { injection: injected(kind), ..steady(6000.0, &[(-0.05, torque_nm)], 0.4) };
+            let driven = drive(cycle);
+            let trip = driven.trip.unwrap();
             assert!(names.contains(&trip.fault), "{trip:?}");
             assert_eq!(trip.safe, SafeState::ShortCircuit);
-            let (until, after) = (ridden.observed.until, ridden.observed.after);
+            let (until, after) = (driven.observed.until, driven.observed.after);
             println!(
                 "{kind:?}: {:.0} A, then {:.0} A and {:.0} V",
                 until.current_a, after.current_a, after.udc_v
             );
             assert!(until.current_a.max(after.current_a) < 1.5 * TRIP_A);
-            let safe_s = ridden.rows.last().unwrap().t_s;
-            let left_nm = mean_nm(&ridden.rows, safe_s - 0.02, safe_s);
+            let safe_s = driven.rows.last().unwrap().t_s;
+            let left_nm = mean_nm(&driven.rows, safe_s - 0.02, safe_s);
             assert!(left_nm.abs() < 30.0, "the short circuit hardly brakes: {left_nm} N·m");
         }
     }
@@ -94,11 +95,11 @@ fn sensor_lost_in_weakening() {
 #[test]
 fn dc_link_collapsing_in_weakening() {
     let kind = Kind::Supply(SupplyFault::Lost);
-    let ride = Ride { injection: injected(kind), ..steady(6000.0, &[(-0.05, FULL_NM)], 0.5) };
-    let ridden = drive(ride);
-    let trip = ridden.trip.unwrap();
+    let cycle = DriveCycle { injection: injected(kind), ..steady(6000.0, &[(-0.05, FULL_NM)], 0.5) };
+    let driven = drive(cycle);
+    let trip = driven.trip.unwrap();
     assert_eq!((trip.fault, trip.safe), (Fault::DcUndervoltage, SafeState::ShortCircuit));
-    let (until, after) = (ridden.observed.until, ridden.observed.after);
+    let (until, after) = (driven.observed.until, driven.observed.after);
     println!("{:.0} A, then {:.0} A and {:.0} V", until.current_a, after.current_a, after.udc_v);
     assert!(until.current_a.max(after.current_a) < 1.5 * TRIP_A);
     // The EMF would charge the link to 1,950 V; short-circuited the machine leaves it where it is.
@@ -107,19 +108,19 @@ fn dc_link_collapsing_in_weakening() {
 
 #[test]
 fn gates_blocked_at_6000_and_enabled_again() {
-    let ride = Ride {
+    let cycle = DriveCycle {
         enable: vec![(0.2, false), (0.35, true)],
         ..steady(6000.0, &[(-0.05, FULL_NM), (0.2, 0.0), (0.45, FULL_NM)], 0.7)
     };
-    let ridden = drive(ride);
-    assert!(ridden.trip.is_none(), "{:?}", ridden.trip);
-    let peaks = ridden.observed.until;
+    let driven = drive(cycle);
+    assert!(driven.trip.is_none(), "{:?}", driven.trip);
+    let peaks = driven.observed.until;
     println!("{:.0} A, {:.0} V", peaks.current_a, peaks.udc_v);
     assert!(peaks.current_a < TRIP_A, "{} A", peaks.current_a);
     assert!(peaks.udc_v < 1.01 * EMF_V, "{} V", peaks.udc_v);
-    let blocked = ridden.rows.iter().filter(|row| (0.21..0.345).contains(&row.t_s));
+    let blocked = driven.rows.iter().filter(|row| (0.21..0.345).contains(&row.t_s));
     assert!(blocked.clone().count() > 1000 && blocked.clone().all(|row| row.mode == Mode::Off));
-    assert!(mean_nm(&ridden.rows, 0.6, 0.7) > 350.0, "torque is back");
+    assert!(mean_nm(&driven.rows, 0.6, 0.7) > 350.0, "torque is back");
 }
 
 #[test]
@@ -129,21 +130,21 @@ fn mode_boundary_crossed_during_a_reversal() {
         for (from_rpm, to_rpm) in [(low_rpm, high_rpm), (high_rpm, low_rpm), (-low_rpm, -high_rpm)] {
             for sign in [1.0, -1.0] {
                 let torque = [(-0.05, sign * FULL_NM), (0.25, -sign * FULL_NM), (0.45, sign * FULL_NM)];
-                let ride = Ride {
+                let cycle = DriveCycle {
                     speed: vec![(0.1, from_rpm), (0.6, to_rpm)],
                     torque: torque.map(|(t_s, torque_nm)| (t_s, (torque_nm, true))).to_vec(),
                     ..steady(0.0, &[], 0.8)
                 };
-                let ridden = drive(ride);
+                let driven = drive(cycle);
                 let modes: std::collections::BTreeSet<_> =
-                    ridden.rows.iter().map(|row| row.mode.name()).collect();
+                    driven.rows.iter().map(|row| row.mode.name()).collect();
                 println!(
                     "{from_rpm} to {to_rpm}, {sign}: {modes:?} {:.0} A",
-                    ridden.observed.until.current_a
+                    driven.observed.until.current_a
                 );
-                assert!(ridden.trip.is_none(), "{from_rpm} to {to_rpm}, {sign}: {:?}", ridden.trip);
+                assert!(driven.trip.is_none(), "{from_rpm} to {to_rpm}, {sign}: {:?}", driven.trip);
                 assert!(modes.len() > 1, "{modes:?}");
-                assert!(ridden.observed.until.current_a < TRIP_A);
+                assert!(driven.observed.until.current_a < TRIP_A);
             }
         }
     }

@@ -238,8 +238,8 @@ fn full_torque(rpm: f64, source: Source, seconds: f64) -> (f64, Band, Zs9Plant) 
             })
             .sum();
         let duty = control.duty(&plant.network, power_w);
-        let depths = regulated(&plant, references);
-        period(&mut plant, depths, duty).unwrap();
+        let indices = regulated(&plant, references);
+        period(&mut plant, indices, duty).unwrap();
         let capacitor_v = plant.network.capacitor_v();
         highest = highest.max(capacitor_v);
         if k > periods / 2 {
@@ -310,8 +310,8 @@ fn behind_a_diode_braking_pumps_the_link_up() {
         let mut control = Control::new(design, false, 0.2);
         for _ in 0..1000 {
             let duty = control.duty(&plant.network, 0.0);
-            let depths = regulated(&plant, [(-5.0, -15.0); 2]);
-            period(&mut plant, depths, duty).unwrap();
+            let indices = regulated(&plant, [(-5.0, -15.0); 2]);
+            period(&mut plant, indices, duty).unwrap();
         }
         (plant.network.capacitor_v(), plant.energies.source_j)
     };

@@ -119,11 +119,11 @@ fn both_motors_agree_with_the_phase_model() {
     let mut plant = plant_at(rpm, &settings);
     plant.network = NetworkState::even(0.0, 0.5 * (LINK_V + 400.0));
     let mut phases = rpm.map(|rpm| PhaseMotor::new(rpm * TAU / 60.0 * 4.0));
-    let depths = [depth_for((-20.0, 50.0), rpm[0], LINK_V), depth_for((-5.0, -35.0), rpm[1], LINK_V)];
+    let indices = [depth_for((-20.0, 50.0), rpm[0], LINK_V), depth_for((-5.0, -35.0), rpm[1], LINK_V)];
     let (mut worst_a, mut worst_nm, mut largest_a) = (0.0_f64, 0.0_f64, 0.0_f64);
     for _ in 0..1500 {
         let [upper, lower] = [0, 1].map(|k| {
-            let (d, q) = depths[k];
+            let (d, q) = indices[k];
             (d.hypot(q), q.atan2(d) + phases[k].theta + phases[k].omega * PERIOD_S * [0.2, 0.7][k])
         });
         for (gates, share) in pattern(upper, lower, 0.2) {

@@ -24,7 +24,7 @@ fn steady_state_is_that_of_the_averaged_network() {
         let mut plant = plant_at(rpm, &Zs9Settings::default());
         plant.network = NetworkState::even(0.0, capacitor_v(duty, 0.0));
         let currents = if loaded { [(-10.0, 30.0), (-15.0, 40.0)] } else { [(0.0, 0.0); 2] };
-        let depths = if loaded {
+        let indices = if loaded {
             [0, 1].map(|k| depth_for(currents[k], rpm[k], link_v))
         } else {
             // Without voltage at no speed there is no current at all.
@@ -37,11 +37,11 @@ fn steady_state_is_that_of_the_averaged_network() {
         }
         // Depths that stay: the motors are a passive load, and the network comes to rest with its resistance.
         for _ in 0..8000 {
-            period(&mut plant, depths, duty).unwrap();
+            period(&mut plant, indices, duty).unwrap();
         }
         plant.take_means();
         for _ in 0..2000 {
-            period(&mut plant, depths, duty).unwrap();
+            period(&mut plant, indices, duty).unwrap();
         }
         let means = plant.take_means().unwrap();
         let expected = capacitor_v(duty, means.inductor_a);
@@ -95,8 +95,8 @@ fn energy_is_kept() {
     let stored = plant.stored_j();
     for k in 0..2000 {
         let motoring = [(-15.0, 40.0), (-10.0, if k < 1000 { 30.0 } else { -20.0 })];
-        let depths = regulated(&plant, motoring);
-        period(&mut plant, depths, 0.2).unwrap();
+        let indices = regulated(&plant, motoring);
+        period(&mut plant, indices, 0.2).unwrap();
     }
     // The gates off for a while, then on again.
     for _ in 0..40 {
@@ -181,14 +181,14 @@ fn finer_calls_change_nothing() {
         plant.network = NetworkState::even(20.0, capacitor_v(0.2, 20.0));
         let link_v = plant.link_v();
         let currents = [(-40.0, 30.0), (-20.0, -45.0)];
-        let depths = [0, 1].map(|k| depth_for(currents[k], [1300.0, -900.0][k], link_v));
+        let indices = [0, 1].map(|k| depth_for(currents[k], [1300.0, -900.0][k], link_v));
         for (motor, (id, iq)) in plant.motors.iter_mut().zip(currents) {
             motor.set_currents(id, iq);
         }
         for k in 0..500 {
             let turns = f64::from(k) * PERIOD_S * 4.0 / 60.0 * TAU;
             let at = |motor: usize, rpm: f64| {
-                let (d, q) = depths[motor];
+                let (d, q) = indices[motor];
                 (d.hypot(q), q.atan2(d) + turns * rpm)
             };
             for (gates, share) in zs9::pattern(at(0, 1300.0), at(1, -900.0), 0.2) {
@@ -288,7 +288,7 @@ fn the_folder_weakens_the_field_where_the_inverter_runs_out_of_voltage() {
     let ratings = &tables.ratings;
     // U_c of 400 V and 533 V: base speed at 120 N·m is 677 and 906 r/min.
     for (link_v, base_rpm) in [(ratings.dc_link_min_v, 677.0), (ratings.dc_link_nominal_v, 906.0)] {
-        let limit = VoltageLimit { udc_v: link_v, depth: 1.0, filled: false };
+        let limit = VoltageLimit { udc_v: link_v, modulation_index: 1.0, filled: false };
         let region = |rpm: f32| operating_point(120.0, rpm * 4.0 * 0.104_72, &limit, tables).region;
         let from = (500_u16..1100).find(|rpm| region(f32::from(*rpm)) != Region::Mtpa).unwrap();
         println!("{link_v} V: weakened from {from} r/min");
@@ -322,7 +322,7 @@ fn with_resistive_switches_the_network_is_that_of_the_circuit() {
     const RPM: [f64; 2] = [500.0, 420.0];
     let duty = 0.2;
     let (id, iq) = (-10.0, 55.0);
-    let depths = RPM.map(|rpm| {
+    let indices = RPM.map(|rpm| {
         let omega = rpm * TAU / 60.0 * 4.0;
         let (ud, uq) = (0.12 * id - omega * ROUND_H * iq, 0.12 * iq + omega * (0.33 + ROUND_H * id));
         (ud.hypot(uq) * 2.0 / 667.0, uq.atan2(ud))
@@ -339,7 +339,7 @@ fn with_resistive_switches_the_network_is_that_of_the_circuit() {
     for k in 0..4_000_u32 {
         let middle_s = (f64::from(k) + 0.5) * PERIOD_S;
         let at = |motor: usize| {
-            let (m, ahead) = depths[motor];
+            let (m, ahead) = indices[motor];
             (m, ahead + RPM[motor] * TAU / 60.0 * 4.0 * middle_s)
         };
         for (gates, share) in zs9::pattern(at(0), at(1), duty) {
@@ -376,8 +376,8 @@ fn energy_is_kept_with_drops() {
     plant.network = NetworkState::even(0.0, capacitor_v(0.2, 0.0));
     let stored = plant.stored_j();
     for k in 0..2_000 {
-        let depths = regulated(&plant, [(-10.0, 40.0), (-5.0, if k < 1_000 { 30.0 } else { -20.0 })]);
-        period(&mut plant, depths, 0.2).unwrap();
+        let indices = regulated(&plant, [(-10.0, 40.0), (-5.0, if k < 1_000 { 30.0 } else { -20.0 })]);
+        period(&mut plant, indices, 0.2).unwrap();
         if k % 10 == 0 {
             plant.advance([LegGates::SHOOT_THROUGH, LegGates::SHOOT_THROUGH, LegGates::ONE], 1e-6).unwrap();
         }

@@ -9,7 +9,7 @@ use crate::drive::Observation;
 use crate::frames::{Dq, SQRT_3, limit};
 use crate::machine::Ratings;
 use crate::ports::{DriveCommand, Report};
-use crate::protection::{self, Trip, Violation};
+use crate::protection::{self, FailedCheck, Trip};
 
 /// The drive's part of the state machine: its request, its observation, and its demands on their way.
 pub trait Demands: Copy {
@@ -20,7 +20,7 @@ pub trait Demands: Copy {
     /// The command to the drive.
     type DriveCommand: Copy;
     /// The status of the demands.
-    type Told: Copy + core::fmt::Debug;
+    type Status: Copy + core::fmt::Debug;
 
     /// Nothing asked for.
     const AT_REST: Self;
@@ -54,7 +54,7 @@ pub trait Demands: Copy {
         true
     }
     /// The demands as they stand.
-    fn told(&self) -> Self::Told;
+    fn told(&self) -> Self::Status;
     /// The command to the drive.
     fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Self::DriveCommand;
 }
@@ -102,7 +102,7 @@ impl Demands for TorqueDemand {
     type Request = Request;
     type Report = Report;
     type DriveCommand = DriveCommand;
-    type Told = f32;
+    type Status = f32;
 
     const AT_REST: Self = Self {
         ramp: Ramp::new(),
@@ -303,7 +303,7 @@ impl LineVoltage {
 }
 
 /// A link that has lost its source while the main contactor is closed: it must not come back without precharge.
-pub(super) fn link_lost(input: &Situation, settings: &Settings) -> Option<Violation> {
+pub(super) fn link_lost(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     settings.line.as_ref()?;
     protection::check_undervoltage(input.observed.udc_v, settings.ratings)
 }

@@ -98,7 +98,7 @@ impl DualRequest {
 
 /// One motor's demand on its way.
 #[derive(Clone, Copy, Debug)]
-enum Way {
+enum DemandRamp {
     Torque(Ramp),
     /// The speed's reference, and the torque that holds it, in N·m.
     Speed(SetPoint, f32),
@@ -112,7 +112,7 @@ struct Motor {
     torque_nm: f32,
 }
 
-impl Way {
+impl DemandRamp {
     const AT_REST: Self = Self::Torque(Ramp::new());
 
     fn is_at_rest(&self) -> bool {
@@ -122,16 +122,16 @@ impl Way {
     /// One slot. A demand of the other kind begins where the motor is: torque at what has held its speed, speed at its speed.
     fn step(&mut self, wanted: Wanted, motor: &Motor, limits: &MotorLimits, settings: &Settings) {
         *self = match (wanted, *self) {
-            (Wanted::Torque(torque_nm), way) => {
-                let mut ramp = match way {
+            (Wanted::Torque(torque_nm), ramp) => {
+                let mut ramp = match ramp {
                     Self::Torque(ramp) => ramp,
                     Self::Speed(_, holding_nm) => Ramp::at(holding_nm),
                 };
                 ramp.step(wanted_nm(torque_nm, motor.speed, limits), &Rates::of(settings));
                 Self::Torque(ramp)
             }
-            (Wanted::Speed(target), way) => {
-                let (mut point, holding_nm) = match way {
+            (Wanted::Speed(target), ramp) => {
+                let (mut point, holding_nm) = match ramp {
                     Self::Speed(point, holding_nm) => (point, holding_nm),
                     Self::Torque(ramp) => (SetPoint::at(motor.speed), ramp.torque_nm()),
                 };
@@ -156,7 +156,7 @@ impl Way {
 /// The ZS9's demands: a torque or a speed of each motor, and the link's voltage.
 #[derive(Clone, Copy, Debug)]
 pub struct DualDemands {
-    ways: [Way; 2],
+    ramps: [DemandRamp; 2],
     /// The limits that hold; `None`: as rated.
     limits: Option<[MotorLimits; 2]>,
     link_ref_v: f32,
@@ -174,9 +174,10 @@ impl Demands for DualDemands {
     type Request = DualRequest;
     type Report = DualReport;
     type DriveCommand = DualDriveCommand;
-    type Told = [MotorDemand; 2];
+    type Status = [MotorDemand; 2];
 
-    const AT_REST: Self = Self { ways: [Way::AT_REST; 2], limits: None, link_ref_v: 0.0, resting_v: None };
+    const AT_REST: Self =
+        Self { ramps: [DemandRamp::AT_REST; 2], limits: None, link_ref_v: 0.0, resting_v: None };
 
     fn levels(request: &DualRequest) -> Levels {
         request.levels
@@ -230,11 +231,11 @@ impl Demands for DualDemands {
     }
 
     fn are_at_rest(&self) -> bool {
-        self.ways.iter().all(Way::is_at_rest)
+        self.ramps.iter().all(DemandRamp::is_at_rest)
     }
 
     fn drop(&mut self) {
-        self.ways = [Way::AT_REST; 2];
+        self.ramps = [DemandRamp::AT_REST; 2];
     }
 
     fn step(&mut self, request: Option<&DualRequest>, report: &DualReport, settings: &Settings) {
@@ -244,7 +245,7 @@ impl Demands for DualDemands {
         self.resting_v = if request.is_none() { Some(source_v) } else { None };
         let motors = omega.into_iter().zip(torque_nm);
         for (((way, wanted), limits), (omega, torque_nm)) in
-            self.ways.iter_mut().zip(wanted).zip(&limits).zip(motors)
+            self.ramps.iter_mut().zip(wanted).zip(&limits).zip(motors)
         {
             let motor = Motor { speed: omega / settings.ratings.pole_pairs, torque_nm };
             way.step(wanted, &motor, limits, settings);
@@ -256,7 +257,7 @@ impl Demands for DualDemands {
     }
 
     fn told(&self) -> [MotorDemand; 2] {
-        self.ways.each_ref().map(Way::demand)
+        self.ramps.each_ref().map(DemandRamp::demand)
     }
 
     fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DualDriveCommand {

@@ -2,7 +2,7 @@
 //! contactors.
 
 use super::{Configuration, Settings, Situation};
-use crate::protection::{self, Fault, SafeState, Violation};
+use crate::protection::{self, FailedCheck, Fault, SafeState};
 
 /// Share of the largest current that a current sensor may show where no current flows.
 const OFFSET_SHARE: f32 = 0.02;
@@ -13,7 +13,7 @@ const NEGATIVE_LINK_SHARE: f32 = 0.02;
 
 /// The first thing that is not in order while the gates are off; `main_closed` is what the main contactor was told.
 #[inline(never)]
-pub(super) fn cause(input: &Situation, main_closed: bool, settings: &Settings) -> Option<Violation> {
+pub(super) fn cause(input: &Situation, main_closed: bool, settings: &Settings) -> Option<FailedCheck> {
     hardware(input)
         .or_else(|| configuration(input))
         .or_else(|| current_sensors(input, settings))
@@ -24,7 +24,7 @@ pub(super) fn cause(input: &Situation, main_closed: bool, settings: &Settings) -
 }
 
 /// Gate drivers, whatever else holds the gates off, and temperatures.
-pub(super) fn hardware(input: &Situation) -> Option<Violation> {
+pub(super) fn hardware(input: &Situation) -> Option<FailedCheck> {
     let feedback = input.feedback;
     if let Some(fault) = feedback.hardware {
         return Some((fault, 1.0, 0.0));
@@ -35,13 +35,13 @@ pub(super) fn hardware(input: &Situation) -> Option<Violation> {
     input.thermal
 }
 
-fn configuration(input: &Situation) -> Option<Violation> {
+fn configuration(input: &Situation) -> Option<FailedCheck> {
     let found = input.feedback.configuration;
     let (value, wanted) = (f32::from(found as u8), f32::from(Configuration::Good as u8));
     (found != Configuration::Good).then_some((Fault::Configuration, value, wanted))
 }
 
-fn current_sensors(input: &Situation, settings: &Settings) -> Option<Violation> {
+fn current_sensors(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     let offsets = input.feedback.offsets_a;
     let offset_a = OFFSET_SHARE * settings.ratings.max_current_a;
     let offset =
@@ -54,7 +54,7 @@ fn current_sensors(input: &Situation, settings: &Settings) -> Option<Violation> 
 
 /// No current flows: for where the gates have been off for a while.
 #[inline(never)]
-pub(super) fn resting_current(input: &Situation, settings: &Settings) -> Option<Violation> {
+pub(super) fn resting_current(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     let (ratings, observed) = (settings.ratings, input.observed);
     // A machine that turns fast, or whose link is empty, lets current flow through the diodes.
     let open = protection::safe_state(observed.emf_omega, observed.udc_v, ratings) == SafeState::GatesOff;
@@ -64,7 +64,7 @@ pub(super) fn resting_current(input: &Situation, settings: &Settings) -> Option<
 }
 
 /// The current of a machine that is shorted is one that its EMF drives through its resistance, else it turns faster than its sensor says.
-pub(super) fn shorted_current(input: &Situation, settings: &Settings) -> Option<Violation> {
+pub(super) fn shorted_current(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     let (ratings, observed) = (settings.ratings, input.observed);
     let driven_a = observed.emf_omega.abs() * ratings.magnet_flux_wb / ratings.stator_resistance_ohm;
     let limit_a = driven_a + RESTING_SHARE * ratings.max_current_a;
@@ -76,7 +76,7 @@ fn is_beyond(value: f32, limit: f32) -> bool {
     value.is_nan() || value > limit
 }
 
-fn link(input: &Situation, settings: &Settings) -> Option<Violation> {
+fn link(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     let (udc_v, ratings) = (input.observed.udc_v, settings.ratings);
     let lowest_v = -NEGATIVE_LINK_SHARE * ratings.dc_link_nominal_v;
     if !udc_v.is_finite() || udc_v < lowest_v {
@@ -86,13 +86,13 @@ fn link(input: &Situation, settings: &Settings) -> Option<Violation> {
 }
 
 /// The sensor answers; at standstill its speed settles at zero, turning at a speed.
-pub(super) fn position(input: &Situation) -> Option<Violation> {
+pub(super) fn position(input: &Situation) -> Option<FailedCheck> {
     let alive = input.feedback.sensor_alive && input.observed.omega.is_finite();
     (!alive).then_some((Fault::PositionSensor, 0.0, 1.0))
 }
 
 /// Below the overspeed trip.
-fn speed(input: &Situation, settings: &Settings) -> Option<Violation> {
+fn speed(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     protection::check_speed(input.observed.omega, settings.ratings)
 }
 
@@ -105,7 +105,7 @@ pub(super) fn open_is_safe(input: &Situation, settings: &Settings) -> bool {
 
 /// The first of the conditions that is not kept while the gates may pulse.
 #[inline(never)]
-pub(super) fn while_pulsing(input: &Situation, main_closed: bool) -> Option<Violation> {
+pub(super) fn while_pulsing(input: &Situation, main_closed: bool) -> Option<FailedCheck> {
     hardware(input)
         .or_else(|| position(input))
         .or_else(|| {
@@ -117,7 +117,11 @@ pub(super) fn while_pulsing(input: &Situation, main_closed: bool) -> Option<Viol
 
 /// Contactors do what they were told.
 #[inline(never)]
-pub(super) fn contactors(input: &Situation, main_closed: bool, precharge_closed: bool) -> Option<Violation> {
+pub(super) fn contactors(
+    input: &Situation,
+    main_closed: bool,
+    precharge_closed: bool,
+) -> Option<FailedCheck> {
     const MAIN: f32 = 1.0;
     const PRECHARGE: f32 = 2.0;
     let feedback = input.feedback;

@@ -3,7 +3,7 @@
 use super::health::contactors;
 use super::settings::Line;
 use super::{Settings, Situation, Switches};
-use crate::protection::{Fault, Violation};
+use crate::protection::{FailedCheck, Fault};
 
 /// Time constants after which charging or discharging has failed.
 const TOO_LONG: f32 = 10.0;
@@ -20,7 +20,7 @@ pub(super) enum Outcome {
     /// Done.
     Done,
     /// Failed.
-    Failed(Violation),
+    Failed(FailedCheck),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,8 +66,8 @@ impl Precharge {
         let (wrong, next) = match self.stage {
             Charging::RelayCloses => (contactors(input, false, true), Charging::Charges),
             Charging::Charges => {
-                if let Some(violation) = contactors(input, false, true) {
-                    return Outcome::Failed(violation);
+                if let Some(failed) = contactors(input, false, true) {
+                    return Outcome::Failed(failed);
                 }
                 let lowest_v = settings.ratings.dc_link_min_v;
                 if passed_s > TOO_LONG * line.precharge_s {
@@ -86,7 +86,7 @@ impl Precharge {
         };
         match wrong {
             None => self.enter(next, udc_v),
-            Some(violation) if passed_s > line.contactor_s => return Outcome::Failed(violation),
+            Some(failed) if passed_s > line.contactor_s => return Outcome::Failed(failed),
             Some(_) => {}
         }
         Outcome::Going
@@ -134,13 +134,13 @@ impl Discharge {
         if !self.open {
             match wrong {
                 None => *self = Self { open: true, slots: 0 },
-                Some(violation) if passed_s > line.contactor_s => return Outcome::Failed(violation),
+                Some(failed) if passed_s > line.contactor_s => return Outcome::Failed(failed),
                 Some(_) => {}
             }
             return Outcome::Going;
         }
-        if let Some(violation) = wrong {
-            return Outcome::Failed(violation);
+        if let Some(failed) = wrong {
+            return Outcome::Failed(failed);
         }
         if udc_v < line.empty_v {
             return Outcome::Done;

@@ -9,7 +9,7 @@ use super::{
     Situation, State, Status, Switches, health, line,
 };
 use crate::control::Warmth;
-use crate::protection::{Fault, SafeState, Trip, Violation};
+use crate::protection::{FailedCheck, Fault, SafeState, Trip};
 use crate::thermal::{Load, Temperatures, ThermalState};
 
 /// The state, with the memory that each state has.
@@ -102,7 +102,7 @@ impl<D: Demands> Operator<D> {
         &mut self,
         input: &Input<D::Request, D::Report>,
         settings: &Settings,
-    ) -> Output<D::DriveCommand, D::Told> {
+    ) -> Output<D::DriveCommand, D::Status> {
         let seen = D::seen(input.observed);
         let thermal = self.warm(&seen, input.feedback, settings);
         let situation = Situation { observed: &seen, feedback: input.feedback, thermal };
@@ -129,21 +129,21 @@ impl<D: Demands> Operator<D> {
         }
     }
 
-    /// The temperatures' slot, and the first violation that lasts.
+    /// The temperatures' slot, and the first failed that lasts.
     #[inline(never)]
-    fn warm(&mut self, seen: &Seen, feedback: &Feedback, settings: &Settings) -> Option<Violation> {
+    fn warm(&mut self, seen: &Seen, feedback: &Feedback, settings: &Settings) -> Option<FailedCheck> {
         let thermal = settings.thermal.filter(|_| D::DERATES)?;
         let Seen { current_a, reference_a, udc_v, map_error, .. } = *seen;
         let max_current_a = settings.ratings.max_current_a;
         let load = Load { current_a, reference_a, udc_v, map_error, max_current_a };
-        let (temperatures, violation) =
+        let (temperatures, failed) =
             self.thermal.step(&load, feedback.temperatures, thermal, settings.slot_s);
         self.temperatures = temperatures;
         let (share, warmth) = temperatures.map_or((1.0, Warmth::NONE), |temperatures| {
             (temperatures.torque_share, thermal.warmth(&temperatures, settings.ratings))
         });
         self.demands.derate(share, warmth);
-        violation
+        failed
     }
 
     fn refuse(&mut self, reason: Refusal) {
@@ -168,7 +168,7 @@ impl<D: Demands> Operator<D> {
     }
 
     #[inline(never)]
-    fn trip(&mut self, (fault, value, limit): Violation, input: &Situation) {
+    fn trip(&mut self, (fault, value, limit): FailedCheck, input: &Situation) {
         let at = input.observed.at;
         self.fail(Trip { fault, value, limit, at, safe: SafeState::GatesOff });
     }
@@ -188,7 +188,7 @@ impl<D: Demands> Operator<D> {
         if let Some(trip) = input.observed.trip {
             return self.fail(trip);
         }
-        let violation = match self.phase {
+        let failed = match self.phase {
             Phase::Init | Phase::Fault { .. } => None,
             Phase::SelfTest { .. } => {
                 health::cause(input, false, settings).or_else(|| health::resting_current(input, settings))
@@ -202,8 +202,8 @@ impl<D: Demands> Operator<D> {
                     .or_else(|| demand::link_lost(input, settings))
             }
         };
-        if let Some(violation) = violation {
-            self.trip(violation, input);
+        if let Some(failed) = failed {
+            self.trip(failed, input);
         }
     }
 
@@ -253,7 +253,7 @@ impl<D: Demands> Operator<D> {
         match outcome {
             Some(Outcome::Going) => {}
             Some(Outcome::Done) => self.phase = done,
-            Some(Outcome::Failed(violation)) => self.trip(violation, input),
+            Some(Outcome::Failed(failed)) => self.trip(failed, input),
             None => self.phase = Phase::Ready,
         }
     }

@@ -32,12 +32,12 @@ pub use ramp::{Ramp, Rates};
 pub use request::{Configuration, Feedback, Levels, Limits, Request, Seen};
 pub use settings::{Line, LineTimes, Settings};
 pub use slot::OperatorPort;
-pub use status::{DualStatus, Refusal, State, Status, Switches, Told};
+pub use status::{DemandWords, DualStatus, Refusal, State, Status, Switches};
 pub use train::TrainLimits;
 
 use crate::drive::Observation;
 use crate::ports::{DriveCommand, Report};
-use crate::protection::Violation;
+use crate::protection::FailedCheck;
 use crate::time::Clock;
 
 /// The PMaSynRM drive's state machine.
@@ -74,8 +74,8 @@ pub struct Input<'a, Q = Request, R = Report> {
 struct Situation<'a> {
     observed: &'a Seen,
     feedback: &'a Feedback,
-    /// The first violation of the temperatures and their sensors.
-    thermal: Option<Violation>,
+    /// The first failed of the temperatures and their sensors.
+    thermal: Option<FailedCheck>,
 }
 
 /// A step's result.

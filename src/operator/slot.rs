@@ -4,7 +4,7 @@ use super::machine::Operator;
 use super::{Demands, Feedback, Input, Output, Settings, Status};
 use crate::cell::Words;
 use crate::drive::{Mailboxes, Observation, Timed, next_slot, slots_between};
-use crate::protection::{SafeState, Trip, Violation};
+use crate::protection::{FailedCheck, SafeState, Trip};
 use crate::time::{Clock, Instant};
 
 /// The port between the operator, its board and whoever commands it.
@@ -13,7 +13,7 @@ pub trait OperatorPort<D: Demands = super::TorqueDemand> {
     fn ask(&mut self, at: Instant, slots: u32) -> (D::Request, Feedback);
     /// Tells the status after the step, its switches to be set at `from`, or as soon as the board can; and the drive's report at the slot's
     /// beginning, `None` of a drive that has not started.
-    fn tell(&mut self, from: Instant, status: &Status<D::Told>, report: Option<&D::Report>);
+    fn tell(&mut self, from: Instant, status: &Status<D::Status>, report: Option<&D::Report>);
 }
 
 /// Steps that a slot makes at most: an idle loop that is away for longer is none that goes on.
@@ -66,7 +66,7 @@ impl<D: Demands> Slot<D> {
     /// answered. Call it once in a slot's time instead of [`Self::run`].
     pub fn refuse(
         &mut self,
-        why: Violation,
+        why: FailedCheck,
         port: &mut impl OperatorPort<D>,
         settings: &Settings,
         clock: &Clock,
@@ -87,7 +87,7 @@ impl<D: Demands> Slot<D> {
         slots: u32,
         (request, feedback): (D::Request, Feedback),
         settings: &Settings,
-    ) -> Output<D::DriveCommand, D::Told> {
+    ) -> Output<D::DriveCommand, D::Status> {
         self.done = Some(observed.at);
         let input = Input { request: &request, observed, feedback: &feedback };
         for _ in 1..slots.min(MOST_STEPS) {

@@ -146,14 +146,14 @@ const NONE: u32 = 0xFF;
 pub type DualStatus = Status<[MotorDemand; 2]>;
 
 /// The demands of a status, as two words.
-pub trait Told: Copy {
+pub trait DemandWords: Copy {
     /// As words.
     fn to_words(self) -> [u32; 2];
     /// The inverse.
     fn from_words(words: [u32; 2]) -> Self;
 }
 
-impl Told for f32 {
+impl DemandWords for f32 {
     #[inline]
     fn to_words(self) -> [u32; 2] {
         [self.to_bits(), 0]
@@ -166,7 +166,7 @@ impl Told for f32 {
 }
 
 /// Bits of the first word's lowest place that say what the demands are: the last bit of a mantissa is nothing to a demand.
-impl Told for [MotorDemand; 2] {
+impl DemandWords for [MotorDemand; 2] {
     fn to_words(self) -> [u32; 2] {
         self.map(|demand| match demand {
             MotorDemand::Torque(demand) => demand.torque_nm.to_bits() & !1,
@@ -182,7 +182,7 @@ impl Told for [MotorDemand; 2] {
     }
 }
 
-impl<T: Told> Status<T> {
+impl<T: DemandWords> Status<T> {
     /// As nine words.
     pub fn to_words(&self) -> [u32; 9] {
         let Self { state, trip, refusal, refusals, torque_nm, switches, temperatures: _ } = *self;

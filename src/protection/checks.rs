@@ -1,6 +1,6 @@
 //! The checks of what is measured and of what is asked for.
 
-use super::{Fault, Violation};
+use super::{FailedCheck, Fault};
 use crate::control::{Demand, Measurements};
 use crate::frames::Abc;
 use crate::machine::Ratings;
@@ -10,13 +10,13 @@ use crate::machine::Ratings;
 pub const INNOVATION_RAD: f32 = 0.05;
 
 /// The angle, `innovation_rad` off what was expected.
-pub fn check_angle(innovation_rad: f32) -> Option<Violation> {
+pub fn check_angle(innovation_rad: f32) -> Option<FailedCheck> {
     let off_rad = innovation_rad.abs();
     (off_rad > INNOVATION_RAD).then_some((Fault::AngleLost, off_rad, INNOVATION_RAD))
 }
 
 /// An angle that is not known, where it is `needed`.
-pub fn check_known(needed: bool) -> Option<Violation> {
+pub fn check_known(needed: bool) -> Option<FailedCheck> {
     needed.then_some((Fault::PositionSensor, 0.0, 1.0))
 }
 
@@ -34,13 +34,13 @@ pub fn are_sound(currents_a: &Abc, ratings: &Ratings) -> bool {
 
 /// Phase currents alone, as both interrupts sample them.
 #[inline]
-pub fn check_currents(currents_a: &Abc, ratings: &Ratings) -> Option<Violation> {
+pub fn check_currents(currents_a: &Abc, ratings: &Ratings) -> Option<FailedCheck> {
     if are_sound(currents_a, ratings) { None } else { find_in_currents(currents_a, ratings) }
 }
 
 /// The same for currents that are not sound.
 #[inline]
-fn find_in_currents(currents_a: &Abc, ratings: &Ratings) -> Option<Violation> {
+fn find_in_currents(currents_a: &Abc, ratings: &Ratings) -> Option<FailedCheck> {
     let sum = currents_a.a + currents_a.b + currents_a.c;
     if !sum.is_finite() {
         return Some((Fault::NotFinite, sum, f32::MAX));
@@ -57,7 +57,7 @@ fn find_in_currents(currents_a: &Abc, ratings: &Ratings) -> Option<Violation> {
 }
 
 /// Everything the control interrupt measures; `omega` electrical, in rad/s.
-pub fn check_measurements(measured: &Measurements, omega: f32, ratings: &Ratings) -> Option<Violation> {
+pub fn check_measurements(measured: &Measurements, omega: f32, ratings: &Ratings) -> Option<FailedCheck> {
     let udc = measured.udc_v;
     if !udc.is_finite() {
         return Some((Fault::NotFinite, udc, f32::MAX));
@@ -81,18 +81,18 @@ pub fn is_sound(measured: &Measurements, omega: f32, demand: &Demand, ratings: &
 }
 
 /// The link while the gates may be on: without them it may be empty.
-pub fn check_undervoltage(udc_v: f32, ratings: &Ratings) -> Option<Violation> {
+pub fn check_undervoltage(udc_v: f32, ratings: &Ratings) -> Option<FailedCheck> {
     (udc_v < ratings.trip_dc_under_v).then_some((Fault::DcUndervoltage, udc_v, ratings.trip_dc_under_v))
 }
 
 /// The operator's demand: any finite number is a demand, which the envelope limits.
-pub fn check_demand(demand: &Demand) -> Option<Violation> {
+pub fn check_demand(demand: &Demand) -> Option<FailedCheck> {
     let torque = demand.torque_nm;
     if torque.is_finite() { None } else { Some((Fault::NotFinite, torque, f32::MAX)) }
 }
 
 /// Mechanical overspeed, for an electrical speed in rad/s.
-pub fn check_speed(omega: f32, ratings: &Ratings) -> Option<Violation> {
+pub fn check_speed(omega: f32, ratings: &Ratings) -> Option<FailedCheck> {
     if omega.abs() > ratings.trip_speed_rad_s * ratings.pole_pairs {
         return Some((Fault::Overspeed, omega.abs() / ratings.pole_pairs, ratings.trip_speed_rad_s));
     }

@@ -184,4 +184,4 @@ pub struct Trip {
 }
 
 /// The first limit that a fault breaks, with its value: (fault, value, limit).
-pub type Violation = (Fault, f32, f32);
+pub type FailedCheck = (Fault, f32, f32);

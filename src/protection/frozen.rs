@@ -4,7 +4,7 @@
 //! coarse converter shows the same value for seconds. So currents that repeat are suspicious only once they should have
 //! changed: because the rotor has turned them, or because the commanded voltage is no longer the one that went with them.
 
-use super::{Fault, Violation};
+use super::{FailedCheck, Fault};
 use crate::control::Measurements;
 use crate::frames::{Abc, AlphaBeta, Angle};
 use crate::machine::Ratings;
@@ -117,7 +117,7 @@ impl FrozenWatch {
         omega: f32,
         period_s: f32,
         ratings: &Ratings,
-    ) -> Option<Violation> {
+    ) -> Option<FailedCheck> {
         let (currents_a, angle) = self.last.replace((measured.currents_a, measured.angle))?;
         let peak_a = || measured.currents_a.peak();
         if currents_a == measured.currents_a && peak_a() > FROZEN_CURRENT_SHARE * ratings.max_current_a {

@@ -1,7 +1,7 @@
 //! The power stage's report of its legs: the fault, and the safe state with such legs.
 
 use super::safe::emf_v;
-use super::{Fault, SafeState, Violation, safe_state};
+use super::{FailedCheck, Fault, SafeState, safe_state};
 use crate::machine::Ratings;
 
 /// The power stage's report of its legs: no fault, mostly.
@@ -18,7 +18,7 @@ pub struct LegFaults {
 
 impl LegFaults {
     /// The fault, if there is one.
-    pub fn check(&self) -> Option<Violation> {
+    pub fn check(&self) -> Option<FailedCheck> {
         if self.blocked != 0 {
             return Some((Fault::DriverBlocked, f32::from(self.blocked), 0.0));
         }

@@ -1,6 +1,6 @@
 //! The limits of the ZS9's link: source, capacitors, shoot-through duty.
 
-use super::{Fault, Violation};
+use super::{FailedCheck, Fault};
 
 /// The ZS9's limits besides those of its motors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub struct LinkLimits {
 
 impl LinkLimits {
     /// The duty that a link voltage needs, `(1 − U_dc/U_in)/2`, if it is outside the range.
-    pub fn check_link_reference(&self, link_v: f32, source_v: f32) -> Option<Violation> {
+    pub fn check_link_reference(&self, link_v: f32, source_v: f32) -> Option<FailedCheck> {
         if !link_v.is_finite() {
             return Some((Fault::NotFinite, link_v, f32::MAX));
         }
@@ -25,14 +25,14 @@ impl LinkLimits {
     }
 
     /// A duty that is commanded.
-    pub fn check_duty(&self, duty: f32) -> Option<Violation> {
+    pub fn check_duty(&self, duty: f32) -> Option<FailedCheck> {
         // Not a number is outside as well.
         let inside = (0.0..=self.duty_max).contains(&duty);
         (!inside).then_some((Fault::DutyRange, duty, self.duty_max))
     }
 
     /// Source and capacitors.
-    pub fn check_link(&self, source_v: f32, capacitor_v: f32) -> Option<Violation> {
+    pub fn check_link(&self, source_v: f32, capacitor_v: f32) -> Option<FailedCheck> {
         if !(source_v + capacitor_v).is_finite() {
             return Some((Fault::NotFinite, source_v + capacitor_v, f32::MAX));
         }

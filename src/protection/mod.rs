@@ -18,7 +18,7 @@ pub use checks::{
     INNOVATION_RAD, are_sound, check_angle, check_currents, check_demand, check_known, check_measurements,
     check_speed, check_undervoltage, is_sound,
 };
-pub use fault::{Fault, Trip, Violation};
+pub use fault::{FailedCheck, Fault, Trip};
 pub use frozen::FrozenWatch;
 pub use legs::LegFaults;
 pub use link::LinkLimits;

@@ -13,18 +13,18 @@
 pub mod authentication;
 mod commands;
 pub mod crc;
-mod dialect;
 pub mod e2e;
+mod endpoint;
 mod experiment;
 mod frame;
 mod message;
+mod message_set;
 mod parameters;
 mod receiver;
 mod scales;
 mod sender;
 mod session;
 mod signal;
-mod station;
 mod telemetry;
 mod traction;
 mod zs9;
@@ -32,10 +32,10 @@ mod zs9;
 pub use commands::{
     COMMAND, Command, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
 };
-pub use dialect::{MessageSet, Taken};
 pub use experiment::{EXPERIMENT, ExperimentFrame, FROM_IDENTIFICATION, OBSERVATION, ObservationFrame};
 pub use frame::{Frame, LENGTH};
 pub use message::{COUNTER, CRC, Message};
+pub use message_set::{MessageSet, Taken};
 pub use parameters::{PARAMETERS, Parameter, Parameters, RPM_PER_RAD_S, WriteError};
 pub use receiver::Reject;
 pub use scales::{Quantity, Scales};
@@ -74,12 +74,12 @@ pub type Receiver = receiver::Receiver<Traction>;
 /// The PMaSynRM drive's end.
 pub type Session = session::Session<Traction>;
 /// The source of the PMaSynRM drive's telemetry.
-pub type Told<'a> = session::Told<'a, Traction>;
+pub type TelemetrySource<'a> = session::TelemetrySource<'a, Traction>;
 /// The PMaSynRM drive's end beside its operator.
-pub type CanEndpoint = station::CanEndpoint<Traction>;
+pub type CanEndpoint = endpoint::CanEndpoint<Traction>;
 /// The ZS9's end.
 pub type Zs9Session = session::Session<Zs9>;
 /// The source of the ZS9's telemetry.
-pub type Zs9Told<'a> = session::Told<'a, Zs9>;
+pub type Zs9TelemetrySource<'a> = session::TelemetrySource<'a, Zs9>;
 /// The ZS9's end beside its operator.
-pub type Zs9CanEndpoint = station::CanEndpoint<Zs9>;
+pub type Zs9CanEndpoint = endpoint::CanEndpoint<Zs9>;

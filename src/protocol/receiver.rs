@@ -1,9 +1,9 @@
 //! The frames that take effect. A frame is judged in this order: identifier, length, CRC, counter, content; the first that is wrong
 //! rejects it whole, and is counted.
 
-use super::dialect::MessageSet;
 use super::e2e::{self, Order, Sequence};
 use super::frame::{Frame, LENGTH};
+use super::message_set::MessageSet;
 use super::scales::Scales;
 use super::signal::Payload;
 use super::telemetry::Counts;
@@ -66,7 +66,7 @@ pub struct Receiver<D> {
     /// In the order of [`MessageSet::TO_DRIVE`].
     channels: [Channel; MOST],
     counts: Counts,
-    dialect: core::marker::PhantomData<D>,
+    message_set: core::marker::PhantomData<D>,
 }
 
 impl<D: MessageSet> Receiver<D> {
@@ -86,7 +86,7 @@ impl<D: MessageSet> Receiver<D> {
             disordered,
             out_of_range,
         };
-        Self { channels: [Channel::NEW; MOST], counts, dialect: core::marker::PhantomData }
+        Self { channels: [Channel::NEW; MOST], counts, message_set: core::marker::PhantomData }
     }
 
     /// So many slots of a millisecond pass; the command begins anew after a silence of `command_ms`.

@@ -1,8 +1,8 @@
 //! The slot of each frame: fixed places in a cycle of 100 ms, so that the bus load is the same whatever happens.
 
-use super::dialect::MessageSet;
 use super::e2e::Counter;
 use super::frame::Frame;
+use super::message_set::MessageSet;
 use super::scales::Scales;
 use super::telemetry::{Counts, ParameterAnswer, StatusFrame, TemperaturesFrame, trip_frames};
 use crate::protection::Trip;
@@ -29,7 +29,7 @@ pub struct Sender<D> {
     page: u32,
     answer: Option<ParameterAnswer>,
     counters: [Counter; 10],
-    dialect: core::marker::PhantomData<D>,
+    message_set: core::marker::PhantomData<D>,
 }
 
 impl<D: MessageSet> Sender<D> {
@@ -40,7 +40,7 @@ impl<D: MessageSet> Sender<D> {
             page: 0,
             answer: None,
             counters: [Counter::new(); 10],
-            dialect: core::marker::PhantomData,
+            message_set: core::marker::PhantomData,
         }
     }
 

@@ -1,8 +1,8 @@
 //! The drive's end: frames in, a request out; a status in, frames out. One step a slot of 1 ms, one frame a slot is sent at most.
 
 use super::commands::ParameterRequest;
-use super::dialect::{MessageSet, Request, Taken, Told as DriveTold};
 use super::frame::Frame;
+use super::message_set::{DemandStatus, MessageSet, Request, Taken};
 use super::parameters::{Parameters, WriteError};
 use super::receiver::Receiver;
 use super::scales::Scales;
@@ -14,9 +14,9 @@ use core::borrow::Borrow;
 
 /// The source of the telemetry.
 #[derive(Clone, Copy, Debug)]
-pub struct Told<'a, D: MessageSet> {
+pub struct TelemetrySource<'a, D: MessageSet> {
     /// The operator's status.
-    pub status: &'a Status<DriveTold<D>>,
+    pub status: &'a Status<DemandStatus<D>>,
     /// Measurements.
     pub measured: &'a D::Measured,
     /// Pulse pattern.
@@ -74,14 +74,14 @@ impl<D: MessageSet> Session<D> {
     }
 
     /// The slot's second half: the frame to send, if one is due.
-    pub fn tell(&mut self, told: &Told<D>) -> Option<Frame> {
-        self.state = told.status.state;
-        let status = StatusFrame::new(told.status, told.mode, self.listening(), self.receiver.counts());
+    pub fn tell(&mut self, source: &TelemetrySource<D>) -> Option<Frame> {
+        self.state = source.status.state;
+        let status = StatusFrame::new(source.status, source.mode, self.listening(), self.receiver.counts());
         self.sender.step(
             &status,
-            (told.measured, self.scales),
-            told.status.temperatures.as_ref(),
-            told.status.trip.as_ref(),
+            (source.measured, self.scales),
+            source.status.temperatures.as_ref(),
+            source.status.trip.as_ref(),
             self.receiver.counts(),
         )
     }

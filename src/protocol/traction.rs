@@ -3,8 +3,8 @@
 use super::commands::{
     COMMAND, Command, LIMITS, LINK_LIMITS, LinkLimits, PARAMETER_REQUEST, ParameterRequest, TorqueLimits,
 };
-use super::dialect::{MessageSet, Taken, motor_limits};
 use super::message::Message;
+use super::message_set::{MessageSet, Taken, motor_limits};
 use super::parameters::{Parameters, RPM_PER_RAD_S};
 use super::scales::Scales;
 use super::signal::Payload;

@@ -5,8 +5,8 @@ use super::commands::{
     PARAMETER, ParameterRequest, SPEED as SPEED_LIMIT, TORQUE_NM, TorqueLimits, VALUE, WITH_TORQUE, WRITE,
     levels, put_levels,
 };
-use super::dialect::{MessageSet, Taken, motor_limits};
 use super::message::Message;
+use super::message_set::{MessageSet, Taken, motor_limits};
 use super::parameters::{Parameters, RPM_PER_RAD_S};
 use super::scales::{Quantity, Scales};
 use super::signal::{OutOfRange, Payload, Signal};

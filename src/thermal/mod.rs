@@ -19,7 +19,7 @@ pub use sensor::{Element, Sensor};
 
 use crate::control::Warmth;
 use crate::machine::Ratings;
-use crate::protection::{Fault, Violation};
+use crate::protection::{FailedCheck, Fault};
 use magnet::MagnetState;
 use model::RiseState;
 
@@ -114,7 +114,7 @@ pub struct ThermalState {
     winding: RiseState,
     junction: RiseState,
     magnets: MagnetState,
-    /// Slots for which each violation has lasted: the sensors' in the order of `read_c`, winding, junction.
+    /// Slots for which each failed has lasted: the sensors' in the order of `read_c`, winding, junction.
     lasted: [u32; 4],
 }
 
@@ -125,7 +125,7 @@ impl ThermalState {
         Self { read_c: [None; 2], winding, junction, magnets: MagnetState::UNKNOWN, lasted: [0; 4] }
     }
 
-    /// One slot. Returns the temperatures once both sensors have been read, and the first violation that lasts.
+    /// One slot. Returns the temperatures once both sensors have been read, and the first failed that lasts.
     #[inline(never)]
     pub fn step(
         &mut self,
@@ -133,7 +133,7 @@ impl ThermalState {
         ratios: Ratios,
         thermal: &Thermal,
         slot_s: f32,
-    ) -> (Option<Temperatures>, Option<Violation>) {
+    ) -> (Option<Temperatures>, Option<FailedCheck>) {
         let sensors = [
             (Fault::WindingSensor, thermal.winding_sensor.read(ratios.winding)),
             (Fault::HeatSinkSensor, thermal.heat_sink_sensor.read(ratios.heat_sink)),
@@ -181,13 +181,13 @@ impl ThermalState {
         Some(Temperatures { winding_c, heat_sink_c, junction_c, magnets_c, torque_share })
     }
 
-    /// The first violation that has lasted long enough.
-    fn persistent(&mut self, found: &[Option<Violation>; 4], slot_s: f32) -> Option<Violation> {
+    /// The first failed that has lasted long enough.
+    fn persistent(&mut self, found: &[Option<FailedCheck>; 4], slot_s: f32) -> Option<FailedCheck> {
         let mut first = None;
-        for (violation, lasted) in found.iter().zip(&mut self.lasted) {
-            *lasted = if violation.is_some() { lasted.saturating_add(1) } else { 0 };
+        for (failed, lasted) in found.iter().zip(&mut self.lasted) {
+            *lasted = if failed.is_some() { lasted.saturating_add(1) } else { 0 };
             if first.is_none() && *lasted as f32 * slot_s >= PERSISTENCE_S {
-                first = *violation;
+                first = *failed;
             }
         }
         first

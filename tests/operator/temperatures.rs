@@ -269,14 +269,14 @@ proptest! {
             let load =
                 Load { current_a, reference_a: current_a, udc_v: 1_500.0, map_error, max_current_a: 233.0 };
             for slot in 1..=10 {
-                let (told, violation) = state.step(&load, Ratios { winding, heat_sink }, &THERMAL, SLOT_S);
+                let (told, failed) = state.step(&load, Ratios { winding, heat_sink }, &THERMAL, SLOT_S);
                 if let Some(Temperatures { winding_c, heat_sink_c, junction_c, torque_share, .. }) = told {
                     prop_assert!((0.0..=1.0).contains(&torque_share));
                     prop_assert!([winding_c, heat_sink_c, junction_c].into_iter().all(f32::is_finite));
                 }
                 let lost = THERMAL.winding_sensor.read(winding).is_err();
                 if slot as f32 * SLOT_S >= PERSISTENCE_S && lost {
-                    prop_assert_eq!(violation.map(|(fault, ..)| fault), Some(Fault::WindingSensor));
+                    prop_assert_eq!(failed.map(|(fault, ..)| fault), Some(Fault::WindingSensor));
                 }
             }
         }

@@ -8,7 +8,8 @@ use tractive::operator::{Request, State, Status, Switches};
 use tractive::protocol::authentication::{Guard, Signer};
 use tractive::protocol::{
     COMMAND, Command, Content, Frame, LENGTH, LIMITS, Listening, Measured, PARAMETER_ANSWER,
-    PARAMETER_REQUEST, PARAMETERS, ParameterRequest, Payload, Receiver, Scales, Session, TO_DRIVE, Told,
+    PARAMETER_REQUEST, PARAMETERS, ParameterRequest, Payload, Receiver, Scales, Session, TO_DRIVE,
+    TelemetrySource,
 };
 
 const PULL: Command = Command { enable: true, torque_nm: 100.0, ..Command::AT_REST };
@@ -246,7 +247,7 @@ fn a_flood_of_requests_moves_no_telemetry() {
             switches,
             temperatures: None,
         };
-        let told = Told { status: &status, measured: &Measured::default(), mode: Mode::Off };
+        let told = TelemetrySource { status: &status, measured: &Measured::default(), mode: Mode::Off };
         let mut sent = Vec::new();
         for ms in 0..1_000 {
             let frames: Vec<Frame> = (0..if flood { MOST } else { 0 }).map(|_| stream.frame(read)).collect();

@@ -9,7 +9,7 @@ use tractive::protocol::{
     COMMAND, COUNTERS, CanEndpoint, Command, Counts, FAULT_LIMIT, FAULT_VALUE, FROM_DRIVE, Frame, LIMITS,
     LINK_LIMITS, LinkLimits, Listening, MOTION, Measured, Outcome, PARAMETER_ANSWER, PARAMETER_REQUEST,
     PARAMETERS, ParameterAnswer, ParameterRequest, Payload, RPM_PER_RAD_S, STATUS, Scales, Session,
-    StatusFrame, TEMPERATURES, TemperaturesFrame, Told, TorqueLimits, trip_number,
+    StatusFrame, TEMPERATURES, TelemetrySource, TemperaturesFrame, TorqueLimits, trip_number,
 };
 use tractive::thermal::Temperatures;
 use tractive::time::Instant;
@@ -42,7 +42,7 @@ impl Bench {
 
     fn slot(&mut self, received: Option<Frame>) -> Request {
         let request = self.session.listen(1, received.as_ref());
-        let told = Told { status: &self.status, measured: &self.measured, mode: Mode::Off };
+        let told = TelemetrySource { status: &self.status, measured: &self.measured, mode: Mode::Off };
         self.sent.extend(self.session.tell(&told));
         request
     }

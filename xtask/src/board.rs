@@ -12,13 +12,13 @@ pub struct Board {
     /// The package.
     pub package: String,
     /// The contents of the package's own file.
-    pub told: Told,
+    pub flashed: Chip,
 }
 
 /// The table `package.metadata.board`.
 #[derive(Clone, Debug, Deserialize, PartialEq, Eq)]
 #[serde(deny_unknown_fields)]
-pub struct Told {
+pub struct Chip {
     /// The chip's name in probe-rs.
     pub chip: String,
     /// The beginning of its flash memory, and with it of the images.
@@ -38,7 +38,7 @@ struct Package {
 
 #[derive(Deserialize)]
 struct Metadata {
-    board: Told,
+    board: Chip,
 }
 
 impl Board {
@@ -47,7 +47,7 @@ impl Board {
         let file = root().join("boards").join(name).join("Cargo.toml");
         let text = std::fs::read_to_string(&file).with_context(|| file.display().to_string())?;
         let Manifest { package } = toml::from_str(&text).with_context(|| file.display().to_string())?;
-        Ok(Self { name: name.to_owned(), package: package.name, told: package.metadata.board })
+        Ok(Self { name: name.to_owned(), package: package.name, flashed: package.metadata.board })
     }
 
     /// The same as it was typed; the error names those that there are.
@@ -79,7 +79,7 @@ mod tests {
     fn a_board_is_what_its_folder_says() {
         let board = Board::read("nucleo-g474re").unwrap();
         assert_eq!(board.package, "tractive-nucleo-g474re");
-        assert_eq!(board.told, Told { chip: "STM32G474RETx".to_owned(), flash_origin: 0x0800_0000 });
+        assert_eq!(board.flashed, Chip { chip: "STM32G474RETx".to_owned(), flash_origin: 0x0800_0000 });
         assert!(Board::all().unwrap().contains(&board));
         assert_eq!(Board::named("nucleo-g474re"), Ok(board));
         let message = Board::named("none").unwrap_err();

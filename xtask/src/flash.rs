@@ -44,7 +44,7 @@ fn spelled(command: &Command) -> String {
 fn commands(board: &Board, log: bool, image: &Path) -> Vec<Command> {
     let probe = |subcommand: &str| {
         let mut command = Command::new(PROGRAM);
-        command.current_dir(root()).args([subcommand, "--chip", &board.told.chip]);
+        command.current_dir(root()).args([subcommand, "--chip", &board.flashed.chip]);
         command
     };
     if log {

@@ -39,7 +39,7 @@ const LEAST_STACK: u64 = 4_096;
 
 /// The same for a board of real hardware, whose image must also lie where its flash memory is, and leave room for the stack.
 pub fn check_board(path: &Path, board: &Board) -> Result<bool> {
-    let (image, wanted) = (read(path)?, board.told.flash_origin);
+    let (image, wanted) = (read(path)?, board.flashed.flash_origin);
     let (is_there, has_room) = (image.origin == wanted, image.sizes.stack >= LEAST_STACK);
     if !is_there {
         println!("the image begins at {:#x}, the board's flash memory at {wanted:#x}", image.origin);

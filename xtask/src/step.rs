@@ -28,7 +28,7 @@ pub enum Step {
     /// Interrupts slow, late and lost, in QEMU
     Overruns,
     /// The PWM interrupt on every instruction of the control interrupt, in QEMU
-    Landings,
+    Preemption,
     /// The image builds
     Image,
     /// No panic within an interrupt's reach, no double precision

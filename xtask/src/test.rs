@@ -131,7 +131,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Fuzz => return Ok(where_possible(crate::fuzz::check()?)),
         Step::Mutants => crate::mutants::check()?,
         Step::Cells => crate::cells::check(setup)?,
-        Step::Landings => crate::landings::check(setup)?,
+        Step::Preemption => crate::preemption::check(setup)?,
         Step::Overruns => crate::overruns::check(setup)?,
         Step::Image => {
             build::reference_images(&setup.toolchain()?)?

@@ -18,7 +18,7 @@ pub use stm32_metapac::Interrupt;
 use stm32_metapac::rcc::vals::Sw;
 use tractive::drive::traction::Shared;
 use tractive::operator::{self, Configuration, Line, Slot, slot_s};
-use tractive::protection::Violation;
+use tractive::protection::FailedCheck;
 use tractive::protocol::{CanEndpoint, Message, TO_DRIVE};
 use tractive::recorder::Recorder;
 
@@ -165,12 +165,12 @@ pub fn complete_stores() {
 
 /// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder
 /// holds. Where the start was `refused` it says why to whoever asks on the bus.
-pub fn idle(refused: Option<Violation>) -> ! {
+pub fn idle(refused: Option<FailedCheck>) -> ! {
     idle_over(CanEndpoint::new(&BUILT_IN.ratings), refused)
 }
 
 /// The same over another end of the protocol.
-pub fn idle_over(station: impl Station, refused: Option<Violation>) -> ! {
+pub fn idle_over(station: impl Station, refused: Option<FailedCheck>) -> ! {
     let line = Line::rated(&BUILT_IN.ratings, POWER_STAGE.line.precharge_s, POWER_STAGE.line.discharge_s);
     let mut rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
     rated.thermal = THERMAL.as_ref();

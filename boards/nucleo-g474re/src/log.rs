@@ -12,7 +12,7 @@ pub struct Log {
 }
 
 /// A control period that a log can tell.
-pub trait Told {
+pub trait LogLine {
     /// In one line.
     fn tell(&self);
 }
@@ -24,7 +24,7 @@ impl Log {
     }
 
     /// Tells the next one of a frozen recorder's records: one a call, because a log that nobody hurries to read holds few.
-    pub fn record<T: Told + Words<N>, const N: usize, const RECORDS: usize>(
+    pub fn record<T: LogLine + Words<N>, const N: usize, const RECORDS: usize>(
         &mut self,
         recorder: &Ring<T, N, RECORDS>,
     ) {
@@ -53,7 +53,7 @@ impl Log {
     }
 }
 
-impl Told for Record {
+impl LogLine for Record {
     fn tell(&self) {
         let Self { at, currents_a, udc_v, angle, id_a, iq_a, voltage_v, state } = *self;
         defmt::info!(
@@ -73,7 +73,7 @@ impl Told for Record {
     }
 }
 
-impl Told for DualRecord {
+impl LogLine for DualRecord {
     fn tell(&self) {
         let Self { at, currents_a: [upper, lower], angles: [first, second], .. } = *self;
         defmt::info!(

@@ -21,7 +21,7 @@ mod firmware {
         self as board, CLOCK, Control, Interrupt as interrupt, POSITION, PULSE, Pwm, SHARED,
     };
     use tractive::drive::traction::{ControlTask, PwmTask, Settings};
-    use tractive::protection::Violation;
+    use tractive::protection::FailedCheck;
     use tractive::time::Instant;
 
     /// The zeros that the start measured, written before the interrupts are unmasked.
@@ -41,9 +41,9 @@ mod firmware {
     }
 
     /// Starts the drive; the error is why it is refused.
-    fn start() -> Result<(), Violation> {
+    fn start() -> Result<(), FailedCheck> {
         let plan = Plan { shortest_half_ticks: settings().devices.shortest_half_ticks };
-        let found = board::prepare(plan).map_err(|error| error.violation())?;
+        let found = board::prepare(plan).map_err(|error| error.failed())?;
         CONTROL_ZEROS.keep(found.control_zeros);
         PWM_ZEROS.keep(found.pwm_zeros);
         board::run();

@@ -14,7 +14,7 @@ use tractive::operator::{
     Configuration, Feedback, OperatorPort, Request, Settings, Slot, Status, TorqueDemand,
 };
 use tractive::ports::Report;
-use tractive::protection::Violation;
+use tractive::protection::FailedCheck;
 use tractive::protocol::{CanEndpoint, Frame};
 use tractive::time::Instant;
 
@@ -166,7 +166,7 @@ impl<S: Station> Serve<'_, S> {
     }
 
     /// The same where the start was refused, and `why`; once in a slot's time.
-    pub fn refuse(&mut self, slot: &mut Slot, why: Violation, rated: &Settings) {
+    pub fn refuse(&mut self, slot: &mut Slot, why: FailedCheck, rated: &Settings) {
         self.collect();
         slot.refuse(why, self, rated, &CLOCK);
     }

@@ -1,6 +1,6 @@
 //! Reasons for which the board does not start.
 
-use tractive::protection::{Fault, Violation};
+use tractive::protection::{FailedCheck, Fault};
 
 /// The reason why the board did not start. All outputs are off and stay off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub enum StartError {
 
 impl StartError {
     /// The fault that a drive tells which was refused to start for this: [`Fault::StartRefused`], and the reason's number.
-    pub const fn violation(&self) -> Violation {
+    pub const fn failed(&self) -> FailedCheck {
         let number = match self {
             Self::WatchdogReset => 1.0,
             Self::FlashLatency => 2.0,

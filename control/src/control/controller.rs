@@ -34,7 +34,7 @@ pub struct Target {
     pub region: Region,
     /// Fundamental that the MTPA point asks for at this speed, as a share of six-step on the link's slow value. Without what the torque's
     /// trim adds, which is each mode's own, and without what the link's damping adds: a mode chosen by them would not last.
-    pub depth: f32,
+    pub modulation_index: f32,
     /// Largest fundamental that may be made, peak phase, in V.
     pub voltage_limit_v: f32,
 }
@@ -46,7 +46,7 @@ impl Target {
         current: Dq { d: 0.0, q: 0.0 },
         flux: Dq { d: 0.0, q: 0.0 },
         region: Region::Mtpa,
-        depth: 0.0,
+        modulation_index: 0.0,
         voltage_limit_v: 0.0,
     };
 }
@@ -215,8 +215,8 @@ impl ControlLaw for Controller {
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
         let demand_nm = self.demand.step(&shaping, ratings);
         let link = self.link.step(udc_v * link_scale, period_s);
-        let most = limits.depth_limit * limits.steady_share;
-        let limit = VoltageLimit { udc_v: link.slow_v / flux, depth: most, filled: limits.filled };
+        let most = limits.index_limit * limits.steady_share;
+        let limit = VoltageLimit { udc_v: link.slow_v / flux, modulation_index: most, filled: limits.filled };
         let trim_nm = self.trim.trim_nm(demand_nm, limits.ripple_share, ratings.max_torque_nm);
         let damping_nm = swing.map_or(0.0, |swing| {
             swing.damping_nm(law.gains.link_damping, demand_nm, omega, ratings.max_torque_nm)
@@ -225,7 +225,7 @@ impl ControlLaw for Controller {
         let outwards = |nm: f32| if demand_nm < 0.0 { demand_nm - nm } else { demand_nm + nm };
         let (trimmed_nm, damped_nm) = (outwards(more_nm), outwards(damping_nm));
         let point = reference::point(trimmed_nm / torque, omega, &limit, self.resistance_ohm(tables), tables);
-        let depth = point.depth
+        let modulation_index = point.modulation_index
             * swing.map_or(link.slow_v / self.link.lowest_v(), |swing| link.slow_v * swing.per_slow_v)
             - DEPTH_PER_TORQUE / ratings.max_torque_nm * more_nm;
         let limited = point.region == Region::Limit;
@@ -245,8 +245,8 @@ impl ControlLaw for Controller {
             current: point.current,
             flux: self.led(&point, way, period_s, tables),
             region: point.region,
-            depth,
-            voltage_limit_v: limits.depth_limit * six_step_v(link.usable_v),
+            modulation_index,
+            voltage_limit_v: limits.index_limit * six_step_v(link.usable_v),
         };
         let OperatingPoint { current, flux, .. } = point;
         self.map_error.step(&map_error::Input {

@@ -24,7 +24,7 @@
 //! let committed = Committed { horizon_s: 0.0, volt_seconds, ripple: None, interval_s: 0.5e-3 };
 //! let limits = ModeLimits {
 //!     follows: Regulated::Mean,
-//!     # depth_limit: 0.9,
+//!     # index_limit: 0.9,
 //!     # steady_share: 1.0,
 //!     # filled: false,
 //!     # ripple_share: 0.05,
@@ -37,7 +37,7 @@
 //!     voltage_limit_v: 800.0,
 //!     # torque_nm: 700.0,
 //!     # region: Region::Mtpa,
-//!     # depth: 0.1,
+//!     # modulation_index: 0.1,
 //!     // …
 //! };
 //! let input = current_loop::Input {

@@ -133,7 +133,7 @@ mod tests {
                 Committed { horizon_s: 0.0, volt_seconds: none, ripple: None, interval_s: HALF_S };
             let limits = ModeLimits {
                 follows: Regulated::Mean,
-                depth_limit: 0.9,
+                index_limit: 0.9,
                 steady_share: 1.0,
                 filled: false,
                 ripple_share: 0.05,
@@ -144,7 +144,7 @@ mod tests {
                 current: Dq::default(),
                 flux: along_d(REFERENCE_WB),
                 region: Region::Mtpa,
-                depth: 0.1,
+                modulation_index: 0.1,
                 voltage_limit_v: limit_v,
             };
             let output = current_loop::step(

@@ -83,7 +83,7 @@ pub struct ModeLimits {
     /// The part of the command that the modulator's mode can follow.
     pub follows: Regulated,
     /// Largest fundamental of the mode as a share of six-step.
-    pub depth_limit: f32,
+    pub index_limit: f32,
     /// Share of that which the operating point may use; what is left is for regulation.
     pub steady_share: f32,
     /// The fundamental is to be that large, whatever the torque needs.

@@ -39,7 +39,7 @@ pub struct VoltageLimit {
     /// DC-link voltage, in V.
     pub udc_v: f32,
     /// Largest fundamental, as a share of six-step.
-    pub depth: f32,
+    pub modulation_index: f32,
     /// `true` if the fundamental always is that large (square wave).
     pub filled: bool,
 }
@@ -58,7 +58,7 @@ pub struct OperatingPoint {
     /// Its source.
     pub region: Region,
     /// Voltage of the MTPA point at this speed, as a share of six-step (above 1 where weakening is needed).
-    pub depth: f32,
+    pub modulation_index: f32,
 }
 
 /// Below this share of the voltage limit the MTPA point needs no weakening, by the flux map that the target has; above, the
@@ -75,7 +75,7 @@ const MTPA_OFF: f32 = 0.002;
 /// # fn main() -> Result<(), tractive_tablegen::InputError> {
 /// let folder = std::path::Path::new("../tables/pmasynrm-180kw");
 /// let tables = tractive_tablegen::MachineFolder::read(folder)?.tables();
-/// let limit = VoltageLimit { udc_v: 1_500.0, depth: 1.0, filled: false };
+/// let limit = VoltageLimit { udc_v: 1_500.0, modulation_index: 1.0, filled: false };
 /// let at_rpm = |torque_nm, rpm: f32| {
 ///     let omega = rpm / 60.0 * core::f32::consts::TAU * tables.ratings.pole_pairs;
 ///     operating_point(torque_nm, omega, &limit, &tables)
@@ -110,9 +110,9 @@ pub(super) fn point(
     let flux = flux_linkage(tables, best);
     let steady_v = flux.j() * omega + best * resistance;
     let six_step_v = six_step_v(limit.udc_v);
-    let voltage_v = limit.depth * six_step_v;
-    let depth = steady_v.length() / six_step_v;
-    let unweakened = OperatingPoint { current: best, flux, torque_nm, region, depth };
+    let voltage_v = limit.modulation_index * six_step_v;
+    let modulation_index = steady_v.length() / six_step_v;
+    let unweakened = OperatingPoint { current: best, flux, torque_nm, region, modulation_index };
     let within_v = SURELY_WITHIN * voltage_v;
     if steady_v.squared() <= within_v * within_v && !limit.filled {
         return unweakened;
@@ -123,7 +123,7 @@ pub(super) fn point(
     if region == Region::Weakening && (right || inside) && !limit.filled {
         return unweakened;
     }
-    OperatingPoint { current, flux: flux_linkage(tables, current), torque_nm, region, depth }
+    OperatingPoint { current, flux: flux_linkage(tables, current), torque_nm, region, modulation_index }
 }
 
 /// Electrical angular speed in rad/s, largest voltage in V and stator resistance in ohm.

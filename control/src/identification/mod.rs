@@ -174,7 +174,7 @@ impl ControlLaw for Identification {
     fn aim(&mut self, input: &AimInput, _law: &Law) {
         self.samples = 0;
         self.udc_v = input.udc_v;
-        self.limit_v = USED_SHARE * input.limits.depth_limit * six_step_v(input.udc_v);
+        self.limit_v = USED_SHARE * input.limits.index_limit * six_step_v(input.udc_v);
         self.target = Target { voltage_limit_v: self.limit_v, ..Target::NONE };
     }
 

@@ -14,8 +14,8 @@ const WHOLE: f32 = 0.99;
 /// β/2 in rad for a fundamental of `voltage_v` (peak phase) on a link of `udc_v`: equations (16) and (17), which
 /// are one: `sin(β/2) = (1 − π u/(2 udc)) / sum`. A voltage beyond six-step gives 0.
 pub fn half_notch_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
-    let depth = core::f32::consts::FRAC_PI_2 * voltage_v / udc_v;
-    asin_up_to_30_degrees(limit((1.0 - depth) / mode.row().notch_sum, 0.0, 0.5))
+    let modulation_index = core::f32::consts::FRAC_PI_2 * voltage_v / udc_v;
+    asin_up_to_30_degrees(limit((1.0 - modulation_index) / mode.row().notch_sum, 0.0, 0.5))
 }
 
 /// Half the zero voltage of a sector, as an angle in rad. A mode that gives all that the link has (square wave) has some only where less

@@ -118,5 +118,5 @@ pub use optimal::ripple as optimal_ripple;
 pub use pattern_transition::TRANSITION_SECTORS;
 pub use reference::Reference;
 pub use ripple::{RippleFlux, ripple_share};
-pub use schedule::{Ladder, Schedule, depth_limit, first_half};
+pub use schedule::{Ladder, Schedule, first_half, index_limit};
 pub use switch_limits::{FREE_CARRIER_SHARE, SwitchLimits};

@@ -175,7 +175,7 @@ macro_rules! modes {
 }
 
 // The frequencies of borders lie a little below what devices of 900 Hz allow (60, 75, 128.6, 180, 300 Hz), so that waiting for a legal
-// angle on the steepest ramp stays within it. Depth alone does not end the asynchronous mode: at a low frequency a pattern of few
+// angle on the steepest ramp stays within it. The modulation index alone does not end the asynchronous mode: at a low frequency a pattern of few
 // pulses would leave more ripple than the tenth of voltage is worth that it adds.
 modes! {
     /// All gates off.

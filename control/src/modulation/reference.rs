@@ -20,7 +20,7 @@ pub struct Reference {
     /// DC-link voltage, in V, greater than zero.
     pub udc_v: f32,
     /// Fundamental that the operating point asks for, as a share of the six-step voltage 2 udc/π: chooses the mode.
-    pub depth: f32,
+    pub modulation_index: f32,
 }
 
 impl Reference {
@@ -32,15 +32,15 @@ impl Reference {
         rate: 0.0,
         at: Instant(0),
         udc_v: 0.0,
-        depth: 0.0,
+        modulation_index: 0.0,
     };
 
-    /// A fundamental with its vector and its carrier at one angle, and a mode by its own depth.
+    /// A fundamental with its vector and its carrier at one angle, and a mode by its own modulation index.
     pub fn turning(voltage_v: f32, angle: Angle, rate: f32, at: Instant, udc_v: f32) -> Self {
         let direction = angle.sin_cos();
         let vector = AlphaBeta { alpha: direction.cos, beta: direction.sin } * voltage_v;
-        let depth = voltage_v / (udc_v * (2.0 * core::f32::consts::FRAC_1_PI));
-        Self { voltage_v, vector, carrier_angle: angle, rate, at, udc_v, depth }
+        let modulation_index = voltage_v / (udc_v * (2.0 * core::f32::consts::FRAC_1_PI));
+        Self { voltage_v, vector, carrier_angle: angle, rate, at, udc_v, modulation_index }
     }
 
     /// The vector at an instant, in V, turned on at constant rate.

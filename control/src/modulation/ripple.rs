@@ -93,12 +93,12 @@ const fn directions<const N: usize>(count: u32) -> [SinCos; N] {
     directions
 }
 
-/// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `depth` of
+/// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `modulation_index` of
 /// six-step: within a tenth of what the pulses have. The carriers count as one, that of 12 carriers a turn.
-pub fn ripple_share(mode: Mode, depth: f32) -> f32 {
+pub fn ripple_share(mode: Mode, modulation_index: f32) -> f32 {
     #[cfg(feature = "optimal")]
-    let depth = mode.branch().map_or(depth, |branch| branch.within(depth));
-    let missing = if depth < 1.0 { 1.0 - depth } else { 0.0 };
+    let modulation_index = mode.branch().map_or(modulation_index, |branch| branch.within(modulation_index));
+    let missing = if modulation_index < 1.0 { 1.0 - modulation_index } else { 0.0 };
     let share = mode.row().ripple;
     share.least + share.linear * missing + share.square * missing * missing
 }

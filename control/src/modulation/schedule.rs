@@ -1,6 +1,6 @@
 //! The choice of the mode, and the angles at which it may change.
 //!
-//! The modes of a ladder stand in a row; each border between two neighbours has a frequency and a modulation depth. Above
+//! The modes of a ladder stand in a row; each border between two neighbours has a frequency and a modulation index. Above
 //! either the drive goes up, below both, less a hysteresis, it comes down, and no sooner than a dwell time after
 //! the last switch. A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
 
@@ -16,17 +16,17 @@ use crate::time::{Clock, Instant};
 #[derive(Clone, Copy, Debug)]
 pub struct Border {
     shares: (f32, f32),
-    depths: (f32, f32),
+    indices: (f32, f32),
 }
 
 impl Border {
     /// Of a mode that gives way to none.
     pub(super) const NEVER: Self =
-        Self { shares: (f32::INFINITY, f32::INFINITY), depths: (f32::INFINITY, f32::INFINITY) };
+        Self { shares: (f32::INFINITY, f32::INFINITY), indices: (f32::INFINITY, f32::INFINITY) };
 
     /// Given in Hz for devices of 900 Hz.
-    pub(super) const fn new(hz: (f32, f32), depths: (f32, f32)) -> Self {
-        Self { shares: (hz.0 / 900.0, hz.1 / 900.0), depths }
+    pub(super) const fn new(hz: (f32, f32), indices: (f32, f32)) -> Self {
+        Self { shares: (hz.0 / 900.0, hz.1 / 900.0), indices }
     }
 }
 
@@ -66,10 +66,10 @@ static OPTIMAL_RUNGS: [Mode; Mode::OPTIMAL.len() + 1] = {
     rungs
 };
 
-/// Room kept between a mode's largest depth and the border above it, and the hysteresis kept below a border that
+/// Room kept between a mode's largest modulation index and the border above it, and the hysteresis kept below a border that
 /// the shortest pulse has lowered; shares of six-step.
 const DEPTH_ROOM: f32 = 0.002;
-const DEPTH_HYSTERESIS: f32 = 0.012;
+const INDEX_HYSTERESIS: f32 = 0.012;
 
 /// Shortest time between two switches of mode, in s.
 const DWELL_S: f32 = 0.03;
@@ -87,12 +87,12 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// The paper's modes by frequency and modulation depth.
+    /// The paper's modes by frequency and modulation index.
     pub const fn new(clock: &Clock) -> Self {
         Self::on(Ladder::PAPER, clock)
     }
 
-    /// The modes of a ladder, by frequency and modulation depth.
+    /// The modes of a ladder, by frequency and modulation index.
     pub const fn on(ladder: Ladder, clock: &Clock) -> Self {
         Self {
             ladder,
@@ -128,7 +128,10 @@ impl Schedule {
                 if made < branch.first {
                     self.last_switch = None;
                 }
-                Reference { depth: if made < seen.depth { made } else { seen.depth }, ..*seen }
+                Reference {
+                    modulation_index: if made < seen.modulation_index { made } else { seen.modulation_index },
+                    ..*seen
+                }
             }
             None => *seen,
         };
@@ -137,12 +140,16 @@ impl Schedule {
             _ => {
                 // The first command is made for the mode that was announced while there was no voltage.
                 if seen.voltage_v == 0.0 {
-                    let carrier =
-                        seen.depth < CARRIER_CATCHES && share(seen, devices) < CARRIER_CATCHES_SHARE;
+                    let carrier = seen.modulation_index < CARRIER_CATCHES
+                        && share(seen, devices) < CARRIER_CATCHES_SHARE;
                     self.catches = if carrier { Mode::Async } else { Mode::Mid3 };
                 }
                 let reach = pick(reached(Mode::Mid3.row(), shortest_notch(seen.rate, devices)), false);
-                if self.catches == Mode::Mid3 && seen.depth >= reach { Mode::Square } else { self.catches }
+                if self.catches == Mode::Mid3 && seen.modulation_index >= reach {
+                    Mode::Square
+                } else {
+                    self.catches
+                }
             }
         }
     }
@@ -176,10 +183,10 @@ impl Schedule {
         let notch = shortest_notch(seen.rate, devices);
         let passes = |below: Mode, from_above: bool| {
             let row = below.row();
-            // Modes of one number of pulses are told apart by depth alone.
+            // Modes of one number of pulses are told apart by modulation index alone.
             let faster = !from_above || row.until.shares != mode.row().until.shares;
             faster && share >= pick(row.until.shares, from_above)
-                || seen.depth >= pick(reached(row, notch), from_above)
+                || seen.modulation_index >= pick(reached(row, notch), from_above)
         };
         // From where the drive stands: up past every border that is passed, else down past those that no longer are.
         let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
@@ -221,14 +228,14 @@ fn pick((up, down): (f32, f32), from_above: bool) -> f32 {
     if from_above { down } else { up }
 }
 
-/// The depths of a mode's border, lowered where the mode does not reach them because of the shortest pulse.
+/// The indices of a mode's border, lowered where the mode does not reach them because of the shortest pulse.
 fn reached(row: &Row, notch: f32) -> (f32, f32) {
     #[cfg(feature = "optimal")]
     if row.branch.is_some() {
-        return row.until.depths;
+        return row.until.indices;
     }
     let reach = row.largest - row.notch_sum * notch - DEPTH_ROOM;
-    if reach < row.until.depths.0 { (reach, reach - DEPTH_HYSTERESIS) } else { row.until.depths }
+    if reach < row.until.indices.0 { (reach, reach - INDEX_HYSTERESIS) } else { row.until.indices }
 }
 
 /// Sine of half the shortest notch, with `rate` in angle units per tick: an angle of a few degrees.
@@ -251,7 +258,7 @@ fn largest(row: &Row, notch: f32) -> f32 {
 
 /// The largest fundamental of a mode as a share of six-step 2 udc/π, with `rate` in angle units per tick: udc/√3 for
 /// the carriers, what the shortest notch leaves for middle 60°, 1 for the square wave.
-pub fn depth_limit(mode: Mode, rate: f32, devices: &SwitchLimits) -> f32 {
+pub fn index_limit(mode: Mode, rate: f32, devices: &SwitchLimits) -> f32 {
     largest(mode.row(), shortest_notch(rate, devices))
 }
 

@@ -59,9 +59,9 @@ use vectors::Direction;
 pub struct MotorVoltage {
     /// Angle of the voltage vector.
     pub angle: Angle,
-    /// Modulation depth m = 2 |V| / U_in, with |V| the peak phase voltage and U_in the link voltage outside
+    /// Modulation index m = 2 |V| / U_in, with |V| the peak phase voltage and U_in the link voltage outside
     /// shoot-through; 0 or more.
-    pub depth: f32,
+    pub modulation_index: f32,
 }
 
 /// The modulator's input.
@@ -83,10 +83,10 @@ pub struct Request {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Applied {
-    /// The upper motor's modulation depth.
-    pub upper_depth: f32,
-    /// The lower motor's modulation depth.
-    pub lower_depth: f32,
+    /// The upper motor's modulation index.
+    pub upper_index: f32,
+    /// The lower motor's modulation index.
+    pub lower_index: f32,
     /// The upper motor has less than it asked for.
     pub upper_limited: bool,
     /// The lower motor has less than it asked for.
@@ -104,10 +104,10 @@ impl Applied {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refused {
-    /// The upper motor's depth; must be finite, 0 or more.
-    UpperDepth,
-    /// The lower motor's depth; must be finite, 0 or more.
-    LowerDepth,
+    /// The upper motor's modulation index; must be finite, 0 or more.
+    UpperIndex,
+    /// The lower motor's modulation index; must be finite, 0 or more.
+    LowerIndex,
     /// The shoot-through duty; must lie in 0 ..= 1.
     ShootThrough,
 }
@@ -123,8 +123,8 @@ pub enum Refused {
 /// use tractive_control::nine_switch::{MotorVoltage, Refused, Request, Scheme, step};
 /// let request = Request {
 ///     scheme: Scheme::Rs,
-///     upper: MotorVoltage { angle: Angle::from_turns(0.1), depth: 0.4 },
-///     lower: MotorVoltage { angle: Angle::from_turns(0.7), depth: 0.3 },
+///     upper: MotorVoltage { angle: Angle::from_turns(0.1), modulation_index: 0.4 },
+///     lower: MotorVoltage { angle: Angle::from_turns(0.7), modulation_index: 0.3 },
 ///     shoot_through: 0.2,
 /// };
 /// let period = step(&request)?;
@@ -150,21 +150,21 @@ pub fn step(request: &Request) -> Result<Period, Refused> {
         Shoot::new(duty, inner, sequence.central).insert(&steps, share)
     };
     // Next to the boundary the upper motor's smallest phase steps, and the lower motor's largest.
-    let gap = shares.upper.span - shares.applied.upper_depth * upper.high_gap;
+    let gap = shares.upper.span - shares.applied.upper_index * upper.high_gap;
     let [near, between, far] = edges(&shares.upper, sequence.upper_inner, gap);
     let upper_legs = upper.by_leg([far, between, near]);
-    let gap = shares.applied.lower_depth * lower.high_gap;
+    let gap = shares.applied.lower_index * lower.high_gap;
     let lower_legs = lower.by_leg(edges(&shares.lower, sequence.lower_inner, gap));
     Ok(Period::new(upper_legs, lower_legs, shares.applied))
 }
 
 /// NaN fails every comparison, so it is refused as well.
 fn check(request: &Request) -> Result<(), Refused> {
-    let is_depth = |depth: f32| (0.0..=f32::MAX).contains(&depth);
-    if !is_depth(request.upper.depth) {
-        Err(Refused::UpperDepth)
-    } else if !is_depth(request.lower.depth) {
-        Err(Refused::LowerDepth)
+    let is_index = |modulation_index: f32| (0.0..=f32::MAX).contains(&modulation_index);
+    if !is_index(request.upper.modulation_index) {
+        Err(Refused::UpperIndex)
+    } else if !is_index(request.lower.modulation_index) {
+        Err(Refused::LowerIndex)
     } else if !(0.0..=1.0).contains(&request.shoot_through) {
         Err(Refused::ShootThrough)
     } else {

@@ -126,7 +126,7 @@ fn is_legal(share: &Share, steps: &Steps, (inner, central, duty): (f32, bool, f3
 
 /// A request for more than there is, at a direction's angle, with a duty.
 fn too_much(duty: f32, angles: [Angle; 2]) -> Request {
-    let [upper, lower] = angles.map(|angle| MotorVoltage { angle, depth: f32::MAX });
+    let [upper, lower] = angles.map(|angle| MotorVoltage { angle, modulation_index: f32::MAX });
     Request { scheme: Scheme::Rthd, upper, lower, shoot_through: duty }
 }
 
@@ -184,9 +184,10 @@ fn no_edge_passes_another_where_the_boundary_slides() {
             let room = 0.25 - 0.25 * duty;
             for (part1, part2) in &parts {
                 let mut request = too_much(duty, [angle1, angle2]);
-                let depth = |part: f32, span: f32| if part < 3.0 { part * room / span } else { part };
-                request.upper.depth = depth(*part1, upper.span);
-                request.lower.depth = depth(*part2, lower.span);
+                let modulation_index =
+                    |part: f32, span: f32| if part < 3.0 { part * room / span } else { part };
+                request.upper.modulation_index = modulation_index(*part1, upper.span);
+                request.lower.modulation_index = modulation_index(*part2, lower.span);
                 let shares = divide(&request, true, &upper, &lower);
                 let boundary = shares.upper.boundary;
                 (smallest, largest) = (smallest.min(boundary), largest.max(boundary));
@@ -218,13 +219,13 @@ fn every_corner_of_a_request_makes_legal_legs() {
         for (number, duty) in angles.iter().flat_map(|angle| duties.map(|duty| (*angle, duty))) {
             let upper = Direction::of(number);
             let fits = (0.25 - 0.25 * duty) / upper.span;
-            for depth in around(fits).chain([0.0, f32::from_bits(1), 0.5 * fits, f32::MAX]) {
+            for modulation_index in around(fits).chain([0.0, f32::from_bits(1), 0.5 * fits, f32::MAX]) {
                 for (angle, other) in angles.iter().step_by(5).zip([fits, 0.0, f32::MAX].into_iter().cycle())
                 {
                     let request = Request {
                         scheme,
-                        upper: MotorVoltage { angle: number, depth },
-                        lower: MotorVoltage { angle: *angle, depth: other },
+                        upper: MotorVoltage { angle: number, modulation_index },
+                        lower: MotorVoltage { angle: *angle, modulation_index: other },
                         shoot_through: duty,
                     };
                     let period = step(&request).unwrap_or_else(|refused| panic!("{refused:?} {request:?}"));
@@ -268,9 +269,9 @@ fn no_value_outside_its_range_makes_pulses() {
     let outside =
         [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MIN, -f32::MIN_POSITIVE, -f32::from_bits(1)];
     for bad in outside {
-        let with = |motor: MotorVoltage| MotorVoltage { depth: bad, ..motor };
-        assert_eq!(step(&Request { upper: with(good.upper), ..good }), Err(Refused::UpperDepth));
-        assert_eq!(step(&Request { lower: with(good.lower), ..good }), Err(Refused::LowerDepth));
+        let with = |motor: MotorVoltage| MotorVoltage { modulation_index: bad, ..motor };
+        assert_eq!(step(&Request { upper: with(good.upper), ..good }), Err(Refused::UpperIndex));
+        assert_eq!(step(&Request { lower: with(good.lower), ..good }), Err(Refused::LowerIndex));
         assert_eq!(step(&Request { shoot_through: bad, ..good }), Err(Refused::ShootThrough));
     }
     assert_eq!(step(&Request { shoot_through: 1.0_f32.next_up(), ..good }), Err(Refused::ShootThrough));

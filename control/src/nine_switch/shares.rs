@@ -28,10 +28,10 @@ pub(super) struct Shares {
     pub applied: Applied,
 }
 
-/// The depths that fit, and the boundary.
+/// The indices that fit, and the boundary.
 #[inline]
 pub(super) fn divide(request: &Request, slides: bool, upper: &Direction, lower: &Direction) -> Shares {
-    let (m1, m2) = (request.upper.depth, request.lower.depth);
+    let (m1, m2) = (request.upper.modulation_index, request.lower.modulation_index);
     // A quarter of the period each, less the motor's half of the shoot-through.
     let room = larger(0.25 - 0.25 * request.shoot_through - ROUNDING, 0.0);
     let (mut upper_room, mut lower_room) = (room, room);
@@ -40,23 +40,23 @@ pub(super) fn divide(request: &Request, slides: bool, upper: &Direction, lower: 
         upper_room = larger(room, 2.0 * room - m2 * lower.span);
         lower_room = larger(room, 2.0 * room - m1 * upper.span);
     }
-    let (upper_depth, upper_limited) = fit(m1, upper.span, upper_room);
-    let (lower_depth, lower_limited) = fit(m2, lower.span, lower_room);
-    let (upper_span, lower_span) = (upper_depth * upper.span, lower_depth * lower.span);
+    let (upper_index, upper_limited) = fit(m1, upper.span, upper_room);
+    let (lower_index, lower_limited) = fit(m2, lower.span, lower_room);
+    let (upper_span, lower_span) = (upper_index * upper.span, lower_index * lower.span);
     // T0/4 + (T3 + T4)/2.
     let boundary = if slides { 0.25 + 0.5 * (lower_span - upper_span) } else { 0.25 };
     Shares {
         upper: Share { boundary, end: 0.5, outward: 1.0, span: upper_span },
         lower: Share { boundary, end: 0.0, outward: -1.0, span: lower_span },
-        applied: Applied { upper_depth, lower_depth, upper_limited, lower_limited },
+        applied: Applied { upper_index, lower_index, upper_limited, lower_limited },
     }
 }
 
-/// The depth that fits into the room, and whether that is less.
+/// The modulation index that fits into the room, and whether that is less.
 #[inline]
-fn fit(depth: f32, span: f32, room: f32) -> (f32, bool) {
-    let wanted = depth * span;
-    if wanted <= room { (depth, false) } else { (room / span, wanted > room + 4.0 * ROUNDING) }
+fn fit(modulation_index: f32, span: f32, room: f32) -> (f32, bool) {
+    let wanted = modulation_index * span;
+    if wanted <= room { (modulation_index, false) } else { (room / span, wanted > room + 4.0 * ROUNDING) }
 }
 
 #[inline]

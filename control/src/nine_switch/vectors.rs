@@ -42,7 +42,7 @@ impl LegState {
     }
 }
 
-/// A voltage vector's direction: its sector, and the dwell times in it at depth 1.
+/// A voltage vector's direction: its sector, and the dwell times in it at modulation index 1.
 ///
 /// With a the angle in sector k, V_k acts for T1 = (√3/2) m T sin(60° − a), V_{k+1} for T2 = (√3/2) m T sin a. Counted from the
 /// sector's middle, a = 30° + φ, both come from one sine and one cosine:
@@ -54,7 +54,7 @@ impl LegState {
 pub(super) struct Direction {
     /// The sector less one, 0 ..= 5.
     sector: u32,
-    /// Largest less smallest phase as a time in the rising half: (T1 + T2)/2 at depth 1, in periods; 3/8 ..= √3/4.
+    /// Largest less smallest phase as a time in the rising half: (T1 + T2)/2 at modulation index 1, in periods; 3/8 ..= √3/4.
     pub span: f32,
     /// Largest less middle phase in the same way; from 0 to the span.
     pub high_gap: f32,

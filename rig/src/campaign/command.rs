@@ -3,9 +3,9 @@
 use super::judge::Verdict;
 use super::options::CampaignOptions;
 use super::{Campaign, Case, Outcome, healthy, random, report};
+use crate::ablation::Ablation;
 use crate::run::bar;
 use crate::shards::{self, Merged, Plan};
-use crate::without::Ablation;
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
 use std::path::Path;

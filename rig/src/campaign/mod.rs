@@ -2,7 +2,7 @@
 //! made of it, and whether that is good enough.
 //!
 //! A case is one run of a drive's own tasks on its bench: it settles, the fault comes, and if the drive has not stopped by then,
-//! another torque is wanted, so that nothing stays hidden. [`judge`] says what is good enough, [`crate::without`] switches one
+//! another torque is wanted, so that nothing stays hidden. [`judge`] says what is good enough, [`crate::ablation`] switches one
 //! protection off to see which cases are lost.
 
 mod action;
@@ -21,8 +21,8 @@ pub mod traction;
 pub use action::Action;
 pub use outcome::Outcome;
 
+use crate::ablation::Ablation;
 use crate::scenario::traction::PatternsName;
-use crate::without::Ablation;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 

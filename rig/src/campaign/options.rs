@@ -1,8 +1,8 @@
 //! The options of `campaign`.
 
+use crate::ablation::Ablation;
 use crate::scenario::traction::PatternsName;
 use crate::shards::Shard;
-use crate::without::Ablation;
 use clap::Args;
 use std::path::PathBuf;
 

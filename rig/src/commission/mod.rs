@@ -66,7 +66,7 @@ pub fn command(commission: &Commission) -> Result<ExitCode> {
 }
 
 /// The answer of the person at the terminal: `true` if ready for a step.
-fn asked(step: &steps::Way) -> Result<bool> {
+fn asked(step: &steps::Stage) -> Result<bool> {
     crate::say!("\n{}\n{}", step.name, step.asks);
     eprint!("[Enter] to go on, q to stop: ");
     std::io::stderr().flush()?;

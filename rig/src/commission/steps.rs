@@ -16,7 +16,7 @@ use core::f64::consts::TAU;
 use tractive::protection::Fault;
 
 /// A step, and what it asks of the person who does it.
-pub struct Way {
+pub struct Stage {
     /// Its name.
     pub name: &'static str,
     /// The state in which everything has to be.
@@ -26,26 +26,26 @@ pub struct Way {
 }
 
 /// All of them, in their order.
-pub const ALL: &[Way] = &[
-    Way {
+pub const ALL: &[Stage] = &[
+    Stage {
         name: "wiring",
         asks: "The image that identifies is on the board, the machine is connected, its rotor stands. Gates stay off; the link is charged \
                and discharged.",
         run: wiring,
     },
-    Way {
+    Stage {
         name: "identification",
         asks: "The rotor is free: no load, nothing in its way. It swings by some degrees, then turns slowly. Stay away from it. The machine \
                folder is written.",
         run: identification,
     },
-    Way {
+    Stage {
         name: "tables",
         asks: "The table generator reads the machine folder; on a board the drive's image is flashed with it now: \
                cargo xtask flash --machine FOLDER.",
         run: tables,
     },
-    Way {
+    Stage {
         name: "first torque",
         asks: "The drive's image with these tables is on the board. A twentieth of the largest torque turns the free rotor for a moment.",
         run: first_torque,

@@ -15,7 +15,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use tractive::control::{OperatingPoint, VoltageLimit, operating_point};
 use tractive::frames::Angle;
-use tractive::modulation::{Mode, Reference, Schedule, SwitchLimits, depth_limit};
+use tractive::modulation::{Mode, Reference, Schedule, SwitchLimits, index_limit};
 use tractive::time::{Clock, Instant};
 use tractive_tablegen::{Optimum, SmoothMap};
 
@@ -139,8 +139,8 @@ impl<'a> View<'a> {
     }
 
     /// The point of a torque at a speed, with a link in V of which a mode uses so much.
-    fn point(&self, torque_nm: f64, speed_rpm: f64, udc_v: f64, depth: f32) -> OperatingPoint {
-        let limit = VoltageLimit { udc_v: udc_v as f32, depth, filled: false };
+    fn point(&self, torque_nm: f64, speed_rpm: f64, udc_v: f64, modulation_index: f32) -> OperatingPoint {
+        let limit = VoltageLimit { udc_v: udc_v as f32, modulation_index, filled: false };
         operating_point(torque_nm as f32, self.omega(speed_rpm) as f32, &limit, self.machine.tables)
     }
 
@@ -320,7 +320,7 @@ impl<'a> View<'a> {
                 let hz = parameters.max_switching_hz / f64::from(mode.turn_ons());
                 60.0 * hz / f64::from(parameters.pole_pairs)
             }),
-            largest_voltage_percent: 100.0 * f64::from(depth_limit(mode, self.rate(to_rpm), &self.devices)),
+            largest_voltage_percent: 100.0 * f64::from(index_limit(mode, self.rate(to_rpm), &self.devices)),
         };
         self.modes().into_iter().map(of).collect()
     }
@@ -334,8 +334,8 @@ impl<'a> View<'a> {
             let mode = mode.map_or(Mode::Async, |(mode, ..)| *mode);
             let point = self.point(most_nm, rpm, udc_v, 1.0);
             let torque_nm = f64::from(point.torque_nm);
-            let depth = depth_limit(mode, self.rate(rpm), &self.devices);
-            let in_mode_nm = f64::from(self.point(most_nm, rpm, udc_v, depth).torque_nm);
+            let modulation_index = index_limit(mode, self.rate(rpm), &self.devices);
+            let in_mode_nm = f64::from(self.point(most_nm, rpm, udc_v, modulation_index).torque_nm);
             let envelope_nm = self.machine.envelope_nm(rpm);
             // To a thousandth: what is less the tables' own rounding makes.
             let percent = |nm: f64| (1e5 * nm.max(0.0) / most_nm).round() / 1e3;

@@ -101,7 +101,7 @@ impl<'a> Loci<'a> {
 
     /// The drive's current for a torque at a speed, in square wave at most; the last column is the torque that it gives, in N·m.
     fn drives(&self, torque_nm: f64, rpm: f64) -> (Point, f64) {
-        let limit = VoltageLimit { udc_v: self.udc_v as f32, depth: 1.0, filled: false };
+        let limit = VoltageLimit { udc_v: self.udc_v as f32, modulation_index: 1.0, filled: false };
         let point = operating_point(torque_nm as f32, self.omega(rpm) as f32, &limit, self.machine.tables);
         ((f64::from(point.current.d), f64::from(point.current.q)), f64::from(point.torque_nm))
     }

@@ -170,7 +170,7 @@ impl Page {
     pub fn curves(&mut self, heading: &str, x: &str, unit: &str, series: &[(&str, Points)]) {
         if x == TIME {
             let series = self.told(series);
-            self.show(Over::Told, "as it was told", None, (heading, unit), series);
+            self.show(Over::Telemetry, "as it was told", None, (heading, unit), series);
         } else {
             self.chart(None, heading, (x, unit), series);
         }
@@ -179,7 +179,7 @@ impl Page {
     /// States over time as they were told: a value is its name's place in the list.
     pub fn states(&mut self, title: &str, names: &[&str], points: Points) {
         let series = self.told(&[("state", points)]);
-        self.show(Over::Told, "as it was told", None, (title, ""), series);
+        self.show(Over::Telemetry, "as it was told", None, (title, ""), series);
         self.name_levels(names);
     }
 

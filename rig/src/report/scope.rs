@@ -11,7 +11,7 @@ pub enum Over {
     /// A part of them, in s.
     Window(usize, f64, f64),
     /// Points over a time that is told by somebody else, such as telemetry.
-    Told,
+    Telemetry,
     /// An axis of its own.
     Own,
 }

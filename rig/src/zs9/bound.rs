@@ -92,7 +92,7 @@ impl Pulses<'_> {
     fn gates(&self, angles: [f64; 2], voltages_v: [f64; 2]) -> Option<Period> {
         let [upper, lower] = [0, 1].map(|k| MotorVoltage {
             angle: Angle::from_turns((angles[k] / TAU).rem_euclid(1.0) as f32),
-            depth: (2.0 * voltages_v[k] / self.link_v) as f32,
+            modulation_index: (2.0 * voltages_v[k] / self.link_v) as f32,
         });
         let request = Request { scheme: self.row.scheme, upper, lower, shoot_through: self.duty as f32 };
         step(&request).ok().filter(|period| period.applied.feasible())

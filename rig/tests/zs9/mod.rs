@@ -35,7 +35,7 @@ fn legs(states: [usize; 3]) -> [LegGates; 3] {
 const UPPER: [[usize; 3]; 6] = [[1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1]];
 const LOWER: [[usize; 3]; 6] = [[2, 1, 1], [2, 2, 1], [1, 2, 1], [1, 2, 2], [1, 1, 2], [2, 1, 2]];
 
-/// The two vectors next to an angle, with their shares of the period for a depth m.
+/// The two vectors next to an angle, with their shares of the period for a modulation index m.
 fn active(table: &[[usize; 3]; 6], m: f64, angle: f64) -> [([LegGates; 3], f64); 2] {
     let angle = angle.rem_euclid(TAU);
     let sector = ((angle / (PI / 3.0)) as usize).min(5);
@@ -44,7 +44,7 @@ fn active(table: &[[usize; 3]; 6], m: f64, angle: f64) -> [([LegGates; 3], f64);
     [(legs(table[sector]), share * (PI / 3.0 - a).sin()), (legs(table[(sector + 1) % 6]), share * a.sin())]
 }
 
-/// A period of gates with their shares of it: (depth, angle in rad) of both motors, shoot-through duty.
+/// A period of gates with their shares of it: (modulation index, angle in rad) of both motors, shoot-through duty.
 pub fn pattern(upper: (f64, f64), lower: (f64, f64), duty: f64) -> Vec<([LegGates; 3], f64)> {
     let (mut first, mut second) = (active(&UPPER, upper.0, upper.1), active(&LOWER, lower.0, lower.1));
     let used: f64 = first.iter().chain(&second).map(|(_, share)| share).sum();
@@ -61,12 +61,12 @@ pub fn pattern(upper: (f64, f64), lower: (f64, f64), duty: f64) -> Vec<([LegGate
     vec![(short, 0.5 * duty), a, b, (v14, 0.5 * zero), (short, 0.5 * duty), c, d, (v15, 0.5 * zero)]
 }
 
-/// A period of the plant with voltages that keep to the rotor frames: (d, q) depths of both motors.
-pub fn period(plant: &mut Zs9Plant, depths: [(f64, f64); 2], duty: f64) -> Result<(), IllegalState> {
+/// A period of the plant with voltages that keep to the rotor frames: (d, q) indices of both motors.
+pub fn period(plant: &mut Zs9Plant, indices: [(f64, f64); 2], duty: f64) -> Result<(), IllegalState> {
     let [upper, lower] = [0, 1].map(|k| {
         let motor = &plant.motors[k];
         let omega = motor.speed_rpm() * TAU / 60.0 * 4.0;
-        let (d, q) = depths[k];
+        let (d, q) = indices[k];
         // Seen from the middle of the motor's own half.
         let ahead = omega * PERIOD_S * [0.2, 0.7][k];
         (d.hypot(q), q.atan2(d) + motor.angle_turns() * TAU + ahead)
@@ -88,7 +88,7 @@ pub fn depth_for(current: (f64, f64), rpm: f64, link_v: f64) -> (f64, f64) {
     (2.0 * ud / link_v, 2.0 * uq / link_v)
 }
 
-/// The depths that lead the currents to a reference: feed-forward and a proportional part, by the measured link.
+/// The indices that lead the currents to a reference: feed-forward and a proportional part, by the measured link.
 pub fn regulated(plant: &Zs9Plant, references: [(f64, f64); 2]) -> [(f64, f64); 2] {
     const BANDWIDTH: f64 = 1500.0;
     let link_v = plant.link_v();

@@ -8,13 +8,13 @@ use crate::control::{
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::ports::MotorDemand;
-use crate::protection::{self, Fault, FrozenWatch, Violation};
+use crate::protection::{self, FailedCheck, Fault, FrozenWatch};
 
 /// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.
 pub const TRACKING_RAD_S: f32 = 4000.0;
 pub use crate::protection::INNOVATION_RAD;
 /// Time over which the speed may change, in s, and by how much in that time, as electrical rad: the rotor itself makes half of it. So a
-/// sensor that begins to count the other way is found where it is too slow for a surprise.
+/// sensor that begins to count the other way is found where it is too slow for an innovation.
 const SLOW_S: f32 = 5e-3;
 const ASTRAY_RAD: f32 = 0.25;
 /// The voltage that the loop may ask for, as a share of the largest one that is to be had at every angle. The modulator gives what its
@@ -86,11 +86,11 @@ impl<L: ControlLaw> Axis<L> {
     /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
     pub fn track(&mut self, angle: Angle, trusted: bool, settings: &Settings) -> Option<f32> {
         let innovation = self.controller.innovation(angle, &settings.clock);
-        let surprise = innovation.signed_radians();
+        let innovation_rad = innovation.signed_radians();
         let known = self.controller.speed_is_known();
-        if known && surprise.abs() > INNOVATION_RAD && !trusted {
+        if known && innovation_rad.abs() > INNOVATION_RAD && !trusted {
             self.controller.lose_angle();
-            return Some(surprise);
+            return Some(innovation_rad);
         }
         self.controller.follow(angle, innovation, &settings.clock);
         let gone_astray = (self.omega() - self.slow) * SLOW_S;
@@ -109,7 +109,7 @@ impl<L: ControlLaw> Axis<L> {
     /// The angle is not known: its sensor has `lost` the rotor if it was known before; and nobody may want pulses.
     #[cold]
     #[inline(never)]
-    pub fn lose_angle(&mut self, lost: Fault, enable: bool) -> Option<Violation> {
+    pub fn lose_angle(&mut self, lost: Fault, enable: bool) -> Option<FailedCheck> {
         self.controller.lose_angle();
         if self.controller.is_following() { Some((lost, 1.0, 0.0)) } else { protection::check_known(enable) }
     }
@@ -144,11 +144,11 @@ impl<L: ControlLaw> Axis<L> {
         lost: Fault,
         settings: &Settings,
         tables: &Tables,
-    ) -> Option<Violation> {
+    ) -> Option<FailedCheck> {
         let period_s = settings.clock.control_s();
-        let violation = self.watch.check(measured, self.omega(), period_s, &tables.ratings)?;
+        let failed = self.watch.check(measured, self.omega(), period_s, &tables.ratings)?;
         let (turned_rad, limit_rad) = self.watch.turned_rad();
-        if self.watch.angle_stands() { Some((lost, turned_rad, limit_rad)) } else { Some(violation) }
+        if self.watch.angle_stands() { Some((lost, turned_rad, limit_rad)) } else { Some(failed) }
     }
 
     /// One control period; what comes of it goes where it stays.
@@ -169,7 +169,7 @@ impl<L: ControlLaw> Axis<L> {
         };
         let limits = ModeLimits {
             follows: Regulated::Mean,
-            depth_limit: LOOP_SHARE,
+            index_limit: LOOP_SHARE,
             steady_share: STEADY_SHARE / LOOP_SHARE,
             filled: false,
             // Linear motors: torque does not depend on the ripple.
@@ -244,7 +244,7 @@ impl<L: ControlLaw> Axis<L> {
         let to_middle = 0.5 * (control_s - carrier_s);
         let between = omega * omega * (control_s * control_s - carrier_s * carrier_s);
         let middle = (share.angle + Angle::within_half_turn(omega * to_middle)).sin_cos();
-        let length = 0.5 * share.depth * (1.0 - between * (1.0 / 24.0));
+        let length = 0.5 * share.modulation_index * (1.0 - between * (1.0 / 24.0));
         AlphaBeta { alpha: middle.cos, beta: middle.sin } * length
     }
 }
@@ -257,7 +257,7 @@ pub fn is_sound(measured: &Measurements, omega: f32, tables: &Tables) -> bool {
 }
 
 /// Phase currents and speed of one motor.
-pub fn check(measured: &Measurements, omega: f32, tables: &Tables) -> Option<Violation> {
+pub fn check(measured: &Measurements, omega: f32, tables: &Tables) -> Option<FailedCheck> {
     protection::check_currents(&measured.currents_a, &tables.ratings)
         .or_else(|| protection::check_speed(omega, &tables.ratings))
 }
@@ -287,7 +287,7 @@ mod tests {
         times_s.into_iter().find(|t_s| follow(then(*t_s)).is_some())
     }
 
-    /// From 250 rad/s on the very next angle is a surprise; below, a sensor that counts the other way is found by where the speed goes.
+    /// From 250 rad/s on the very next angle is off; below, a sensor that counts the other way is found by where the speed goes.
     #[test]
     fn a_sensor_that_counts_the_other_way_is_found_at_low_speed_too_and_a_quick_rotor_is_not() {
         for omega in [-240.0, -100.0, -40.0, 40.0, 100.0, 240.0] {

@@ -8,7 +8,7 @@ use crate::drive::{Gates, PeriodInput, SlotTimer};
 use crate::frames::{Angle, SQRT_3};
 use crate::machine::{Machine, Tables};
 use crate::ports::{ControlPort, Dual, DualReport, DualSample, HardwareBreak, MotorDemand};
-use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
+use crate::protection::{self, FailedCheck, Fault, MaskedFaults, SafeState, Trip};
 use crate::recorder::{DualRecord, DualState};
 use crate::time::Instant;
 use core::f32::consts::{FRAC_PI_4, TAU};
@@ -37,7 +37,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     filtered_v: Option<f32>,
     /// Nominal instant of the next call.
     now: Instant,
-    disarmed: MaskedFaults,
+    masked: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
     /// `true` once the operator was asked for a command: who is not asked is not told.
@@ -78,7 +78,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             upper_aims: false,
             filtered_v: None,
             now: Instant(settings.clock.control_ticks),
-            disarmed: MaskedFaults::NONE,
+            masked: MaskedFaults::NONE,
             trip: None,
             acknowledge: Acknowledge::new(),
             operated: false,
@@ -93,8 +93,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// The same without a check.
-    pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
-        self.disarmed = disarmed;
+    pub const fn without(mut self, masked: MaskedFaults) -> Self {
+        self.masked = masked;
         self
     }
 
@@ -241,7 +241,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// The PWM interrupt that should have come since the last one seen and has not: since when, in s.
-    fn overdue(&self, applied: &DualApplied, now: Instant) -> Option<Violation> {
+    fn overdue(&self, applied: &DualApplied, now: Instant) -> Option<FailedCheck> {
         let late = now.since(applied.at.after(self.settings.carrier_ticks));
         (late >= 0).then(|| (Fault::PwmDeadline, self.settings.clock.seconds(late), 0.0))
     }
@@ -261,9 +261,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
 
     /// Follows one rotor.
     #[inline(always)]
-    fn follow<const MOTOR: usize>(&mut self, measured: Option<Angle>, enable: bool) -> Option<Violation> {
+    fn follow<const MOTOR: usize>(&mut self, measured: Option<Angle>, enable: bool) -> Option<FailedCheck> {
         let (axis, fault) = (&mut self.axes[MOTOR], SENSOR_LOST[MOTOR]);
-        let trusted = self.disarmed.has(fault);
+        let trusted = self.masked.has(fault);
         match measured {
             Some(measured) => axis
                 .track(measured, trusted, &self.settings)
@@ -316,18 +316,18 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     fn find_fault(&mut self, input: Input, measured: &[Measurements; 2], port: &mut impl ControlPort<Dual>) {
         let Input { sample, command } = input;
         let limits = &self.settings.limits;
-        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
-        let mut violation = limits
+        let armed = |(fault, _, _): &FailedCheck| !self.masked.has(*fault);
+        let mut failed = limits
             .check_link(sample.source_v, sample.capacitor_v)
             .or_else(|| limits.check_link_reference(command.link_ref_v, sample.source_v));
         for ((axis, measured), demand) in self.axes.iter().zip(measured).zip(&command.demands) {
-            violation = violation
+            failed = failed
                 .filter(armed)
                 .or_else(|| axis::check(measured, axis.omega(), self.machine.tables()))
                 .filter(armed)
                 .or_else(|| check_demand(demand));
         }
-        self.check(violation, port);
+        self.check(failed, port);
     }
 
     #[inline(always)]
@@ -393,17 +393,17 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         (self.driven.duty, self.driven.inductor_ref_a) = (duty, inductor_ref_a);
     }
 
-    fn check(&mut self, violation: Option<Violation>, port: &mut impl ControlPort<Dual>) {
-        if let (Some(violation), None) = (violation, self.trip) {
-            self.trip_on(violation, port);
+    fn check(&mut self, failed: Option<FailedCheck>, port: &mut impl ControlPort<Dual>) {
+        if let (Some(failed), None) = (failed, self.trip) {
+            self.trip_on(failed, port);
         }
     }
 
     /// Out of line: it happens once, and there are many checks.
     #[cold]
     #[inline(never)]
-    fn trip_on(&mut self, (fault, value, limit): Violation, port: &mut impl ControlPort<Dual>) {
-        if self.disarmed.has(fault) {
+    fn trip_on(&mut self, (fault, value, limit): FailedCheck, port: &mut impl ControlPort<Dual>) {
+        if self.masked.has(fault) {
             return;
         }
         let at = self.now.before(self.settings.clock.control_ticks);
@@ -414,7 +414,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
 }
 
 /// Any finite number is a demand, which the envelope limits.
-fn check_demand(demand: &MotorDemand) -> Option<Violation> {
+fn check_demand(demand: &MotorDemand) -> Option<FailedCheck> {
     match demand {
         MotorDemand::Torque(demand) => protection::check_demand(demand),
         MotorDemand::Speed(speed) if speed.is_finite() => None,

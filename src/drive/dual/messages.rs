@@ -89,8 +89,8 @@ impl Words<10> for DualCommand {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorShare {
-    /// Modulation depth, 2 |V|/U_in.
-    pub depth: f32,
+    /// Modulation index, 2 |V|/U_in.
+    pub modulation_index: f32,
     /// Angle of the vector.
     pub angle: Angle,
 }
@@ -116,9 +116,9 @@ impl Words<10> for DualApplied {
         [
             self.at.0,
             u32::from(self.next.is_some()) | u32::from(self.released) << 8,
-            upper.depth.to_bits(),
+            upper.modulation_index.to_bits(),
             upper.angle.0,
-            lower.depth.to_bits(),
+            lower.modulation_index.to_bits(),
             lower.angle.0,
             code,
             value,
@@ -129,7 +129,10 @@ impl Words<10> for DualApplied {
 
     fn from_words(words: [u32; 10]) -> Self {
         let [at, pulsing, d1, a1, d2, a2, trip @ ..] = words;
-        let share = |depth, angle| MotorShare { depth: f32::from_bits(depth), angle: Angle(angle) };
+        let share = |modulation_index, angle| MotorShare {
+            modulation_index: f32::from_bits(modulation_index),
+            angle: Angle(angle),
+        };
         Self {
             at: Instant(at),
             released: (pulsing >> 8) as u8,

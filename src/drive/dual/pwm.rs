@@ -7,7 +7,7 @@ use crate::frames::{Angle, limit};
 use crate::machine::{Machine, Tables};
 use crate::nine_switch::{self, DeadTime, GateTicks, MotorVoltage, Period, Refused, Request};
 use crate::ports::{Dual, GateFeedback, PlayedPeriod, PowerSample, PwmPort};
-use crate::protection::{self, Fault, MaskedFaults, SafeState, Trip, Violation};
+use crate::protection::{self, FailedCheck, Fault, MaskedFaults, SafeState, Trip};
 use crate::time::Instant;
 use core::sync::atomic::Ordering;
 
@@ -31,7 +31,7 @@ pub struct PwmTask<M = &'static Tables> {
     next: PlayedPeriod,
     /// The states that the gates should have shown in the period that was played before, and in the one that is played.
     expected: [Expected; 2],
-    disarmed: MaskedFaults,
+    masked: MaskedFaults,
     trip: Option<Trip>,
     /// Link voltage at the last peak, in V.
     last_link_v: Option<f32>,
@@ -49,7 +49,7 @@ impl<M: Machine> PwmTask<M> {
             now: Instant(settings.first_peak_ticks()),
             next: PlayedPeriod::off(settings.half_steps()),
             expected: [Expected::OFF; 2],
-            disarmed: MaskedFaults::NONE,
+            masked: MaskedFaults::NONE,
             trip: None,
             last_link_v: None,
             released: 0,
@@ -63,8 +63,8 @@ impl<M: Machine> PwmTask<M> {
     }
 
     /// The same without a check.
-    pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
-        self.disarmed = disarmed;
+    pub const fn without(mut self, masked: MaskedFaults) -> Self {
+        self.masked = masked;
         self
     }
 
@@ -106,8 +106,8 @@ impl<M: Machine> PwmTask<M> {
         }
         let began = Instant(shared.began.load(Ordering::Relaxed));
         let stale = stale(now, began, &self.settings.clock);
-        let violation = self.violation(&sample, command.as_ref(), stale);
-        self.check(violation, port);
+        let failed = self.failed(&sample, command.as_ref(), stale);
+        self.check(failed, port);
         let mut given = None;
         let half_steps = self.settings.half_steps();
         let mut expected = Expected::OFF;
@@ -159,11 +159,11 @@ impl<M: Machine> PwmTask<M> {
         let moved_v = limit(link_v - self.last_link_v.unwrap_or(link_v), -MOST_MOVED_V, MOST_MOVED_V);
         let link_v = link_v + moved_v;
         let link_v = if link_v > LEAST_LINK_V { link_v } else { LEAST_LINK_V };
-        let depth_per_volt = 2.0 / link_v;
+        let index_per_volt = 2.0 / link_v;
         let ahead = self.now.since(command.at) as f32;
         let [upper, lower] = command.motors.map(|motor| MotorVoltage {
             angle: motor.angle + Angle((motor.rate * ahead) as i32 as u32),
-            depth: motor.voltage_v * depth_per_volt,
+            modulation_index: motor.voltage_v * index_per_volt,
         });
         Request { scheme: command.scheme, upper, lower, shoot_through: command.duty }
     }
@@ -176,15 +176,15 @@ impl<M: Machine> PwmTask<M> {
         }
     }
 
-    fn violation(
+    fn failed(
         &self,
         sample: &PowerSample,
         command: Option<&DualCommand>,
-        stale: Option<Violation>,
-    ) -> Option<Violation> {
+        stale: Option<FailedCheck>,
+    ) -> Option<FailedCheck> {
         let limits = &self.settings.limits;
         let [upper, lower] = &sample.currents_a;
-        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
+        let armed = |(fault, _, _): &FailedCheck| !self.masked.has(*fault);
         protection::check_currents(upper, &self.machine.tables().ratings)
             .filter(armed)
             .or_else(|| protection::check_currents(lower, &self.machine.tables().ratings).filter(armed))
@@ -202,7 +202,7 @@ impl<M: Machine> PwmTask<M> {
     /// Gates that were not seen as they should be since the last peak: in the falling half of the one period and the rising
     /// half of the other. A pause must be seen in its rising half alone: the falling one may be over before the board has begun to look
     /// anew, where it lies close around the peak.
-    fn stuck(&self, seen: &GateFeedback) -> Option<Violation> {
+    fn stuck(&self, seen: &GateFeedback) -> Option<FailedCheck> {
         let [before, running] = &self.expected;
         let missing = (before.must_be_on | running.must_be_on) & !seen.on;
         let surplus = seen.on & !(before.may_be_on | running.may_be_on);
@@ -222,11 +222,11 @@ impl<M: Machine> PwmTask<M> {
         }
     }
 
-    fn check(&mut self, violation: Option<Violation>, port: &mut impl PwmPort<Dual>) {
-        let (Some((fault, value, limit)), None) = (violation, self.trip) else {
+    fn check(&mut self, failed: Option<FailedCheck>, port: &mut impl PwmPort<Dual>) {
+        let (Some((fault, value, limit)), None) = (failed, self.trip) else {
             return;
         };
-        if self.disarmed.has(fault) {
+        if self.masked.has(fault) {
             return;
         }
         let at = self.now.before(self.settings.carrier_ticks);
@@ -286,15 +286,15 @@ impl Expected {
 fn shares(request: &Request, period: &Period) -> [MotorShare; 2] {
     let applied = &period.applied;
     [
-        MotorShare { depth: applied.upper_depth, angle: request.upper.angle },
-        MotorShare { depth: applied.lower_depth, angle: request.lower.angle },
+        MotorShare { modulation_index: applied.upper_index, angle: request.upper.angle },
+        MotorShare { modulation_index: applied.lower_index, angle: request.lower.angle },
     ]
 }
 
-fn refusal(refused: Refused, request: &Request) -> Violation {
+fn refusal(refused: Refused, request: &Request) -> FailedCheck {
     match refused {
-        Refused::UpperDepth => (Fault::NotFinite, request.upper.depth, f32::MAX),
-        Refused::LowerDepth => (Fault::NotFinite, request.lower.depth, f32::MAX),
+        Refused::UpperIndex => (Fault::NotFinite, request.upper.modulation_index, f32::MAX),
+        Refused::LowerIndex => (Fault::NotFinite, request.lower.modulation_index, f32::MAX),
         Refused::ShootThrough => (Fault::DutyRange, request.shoot_through, 1.0),
     }
 }

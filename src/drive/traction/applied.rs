@@ -8,7 +8,7 @@ use crate::control::{Boundary, Committed, ModeLimits, Regulated, Ripple};
 use crate::frames::{AlphaBeta, Angle};
 #[cfg(feature = "optimal")]
 use crate::modulation::optimal_ripple;
-use crate::modulation::{Mode, Reference, Regulation, RippleFlux, depth_limit, first_half, ripple_share};
+use crate::modulation::{Mode, Reference, Regulation, RippleFlux, first_half, index_limit, ripple_share};
 use crate::time::{Clock, Instant};
 
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
@@ -23,7 +23,7 @@ pub(super) struct Steady {
     /// The fundamental of the last operating point, in V.
     pub voltage_v: f32,
     /// Fundamental that the last operating point would have without a limit, as a share of six-step.
-    pub depth: f32,
+    pub modulation_index: f32,
 }
 
 /// The volt-seconds of the halves that ended at the newest boundary, and their time, on a link of this voltage and of currents that are so many ticks late. The last half counts where its beginning was the boundary
@@ -64,7 +64,7 @@ pub(super) const fn follows(mode: Mode) -> Regulated {
 /// Before the first operating point.
 pub(super) const NO_LIMITS: ModeLimits = ModeLimits {
     follows: Regulated::Mean,
-    depth_limit: 0.0,
+    index_limit: 0.0,
     steady_share: 1.0,
     filled: false,
     ripple_share: 1.0,
@@ -81,17 +81,17 @@ pub(super) fn limits(
 ) -> ModeLimits {
     let Settings { clock, devices, .. } = settings;
     let mode = decision.mode;
-    let largest = depth_limit(mode, clock.angle_rate(steady.omega), devices);
+    let largest = index_limit(mode, clock.angle_rate(steady.omega), devices);
     // Edges can move at an optimised pattern's largest index, too.
     let is_all = mode.is_whole() || mode.is_optimal();
     let largest = if is_all { largest } else { REGULATION_ROOM * largest };
-    let (depth_limit, filled) = exit.fill(mode, largest, steady.depth, passed_s);
+    let (index_limit, filled) = exit.fill(mode, largest, steady.modulation_index, passed_s);
     ModeLimits {
         follows: follows(mode),
-        depth_limit,
+        index_limit,
         steady_share: 1.0,
         filled,
-        ripple_share: ripple_share(mode, steady.depth),
+        ripple_share: ripple_share(mode, steady.modulation_index),
         settled: exit.is_settled(decision),
     }
 }

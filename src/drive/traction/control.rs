@@ -56,7 +56,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     /// The fundamental of the last command's operating point, in V.
     steady_v: f32,
     /// Fundamental that the last operating point would have without a limit and without the trim, as a share of six-step.
-    depth: f32,
+    modulation_index: f32,
     exit: SixStepExit,
     /// The link's voltage over what its sensor reads, as far as it is known.
     link_scale: f32,
@@ -69,7 +69,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     revises: bool,
     /// Mode that it was made for.
     mode: Mode,
-    disarmed: MaskedFaults,
+    masked: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
     /// `true` once the operator was asked for a command: who is not asked is not told.
@@ -112,7 +112,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             aimed: None,
             limits: NO_LIMITS,
             steady_v: 0.0,
-            depth: 0.0,
+            modulation_index: 0.0,
             exit: SixStepExit::new(),
             link_scale: 1.0,
             damper: LinkDamper::at(0.0),
@@ -121,7 +121,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             reference: Reference::NONE,
             revises: false,
             mode: Mode::Off,
-            disarmed: MaskedFaults::NONE,
+            masked: MaskedFaults::NONE,
             trip: None,
             acknowledge: Acknowledge::new(),
             operated: false,
@@ -140,8 +140,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// The same without a check.
-    pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
-        self.disarmed = disarmed;
+    pub const fn without(mut self, masked: MaskedFaults) -> Self {
+        self.masked = masked;
         self
     }
 
@@ -236,8 +236,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let overdue = self.pulses.newest().and_then(|newest| newest.overdue(now, &self.settings.clock));
         self.check(overdue, sample, port);
         self.check(lost, sample, port);
-        let violation = self.judge(command, &measured, omega);
-        self.check(violation, sample, port);
+        let failed = self.judge(command, &measured, omega);
+        self.check(failed, sample, port);
         Seen { now, measured, omega, loaded: told.map_or(Mode::Off, |told| told.mode) }
     }
 

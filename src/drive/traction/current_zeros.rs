@@ -5,7 +5,7 @@
 //! pulses, where a current is not known to be nothing, none is.
 
 use crate::frames::Abc;
-use crate::protection::{Fault, Violation};
+use crate::protection::{FailedCheck, Fault};
 
 /// Control periods without pulses until no current is left that flowed under them.
 const SETTLING: u32 = 50;
@@ -60,13 +60,13 @@ impl CurrentZeros {
 
     /// Pulses begin, or go on, in a machine of this largest current, in A. An offset that is too large is a fault, until a later rest shows none.
     #[inline(always)]
-    pub fn begin(&mut self, largest_a: f32) -> Option<Violation> {
+    pub fn begin(&mut self, largest_a: f32) -> Option<FailedCheck> {
         if self.periods == 0 && self.refused_a == 0.0 { None } else { self.take_over(largest_a) }
     }
 
     #[cold]
     #[inline(never)]
-    fn take_over(&mut self, largest_a: f32) -> Option<Violation> {
+    fn take_over(&mut self, largest_a: f32) -> Option<FailedCheck> {
         let limit_a = FAULT_SHARE * largest_a;
         if core::mem::take(&mut self.periods) >= SETTLING + LEAST {
             let offset_a = self.mean.peak();

@@ -5,7 +5,7 @@ use crate::cell::{History, Mailbox, Place};
 use crate::drive::messages::{LOADED_WORDS, LoadedRecord, PLANNED_WORDS, PlannedHalf, volt_ticks};
 use crate::frames::{Abc, AlphaBeta};
 use crate::modulation::{CarrierHalf, Mode, Modulator, Reference, Schedule};
-use crate::protection::{Fault, Violation};
+use crate::protection::{FailedCheck, Fault};
 use crate::time::{Clock, Instant};
 
 /// By which part of a control period the PWM interrupt may be late before control calls it lost: more than it takes to enter it.
@@ -83,7 +83,7 @@ impl Half {
 
     /// The PWM interrupt that should have come by `now`, where the half begins, and has not: since when, in s.
     #[inline]
-    pub fn overdue(&self, now: Instant, clock: &Clock) -> Option<Violation> {
+    pub fn overdue(&self, now: Instant, clock: &Clock) -> Option<FailedCheck> {
         let late = now.since(self.begins);
         let limit = (clock.control_ticks / PWM_LATE_PART) as i32;
         (late > limit).then(|| (Fault::PwmDeadline, clock.seconds(late), clock.seconds(limit)))
@@ -97,7 +97,7 @@ impl Half {
 
 /// The PWM interrupt's word of itself at the newest boundary.
 #[derive(Clone, Copy)]
-pub(super) struct Told {
+pub(super) struct PwmStatus {
     /// `true` once it has found a fault.
     pub tripped: bool,
     /// Number of the release that it had carried out.
@@ -126,7 +126,7 @@ pub(super) struct Pulses {
     unplanned: Instant,
     /// Number of the half that was loaded at the newest boundary, and what the PWM interrupt told there; `None` before it has come.
     loaded: u32,
-    told: Option<(Place, Told)>,
+    told: Option<(Place, PwmStatus)>,
     /// Half number n is in place `n % REMEMBERED`.
     halves: [Half; REMEMBERED],
 }
@@ -178,7 +178,7 @@ impl Pulses {
         loaded: &History<LOADED_WORDS>,
         now: Instant,
         valid: Instant,
-    ) -> Option<Told> {
+    ) -> Option<PwmStatus> {
         if !self.told.is_some_and(|(place, _)| loaded.is_newest(place)) {
             self.told = self.look_anew(loaded, now, valid).or(self.told);
         }
@@ -192,7 +192,7 @@ impl Pulses {
         loaded: &History<LOADED_WORDS>,
         now: Instant,
         valid: Instant,
-    ) -> Option<(Place, Told)> {
+    ) -> Option<(Place, PwmStatus)> {
         let place = loaded.find(LATEST, |record| {
             let record = LoadedRecord(record);
             // A record that was written has a half before its next boundary.
@@ -210,7 +210,7 @@ impl Pulses {
             Some(number) => self.loaded = number,
             None => self.begin_anew(at, begins, valid),
         }
-        Some((place, Told { tripped, released, mode: self.before(1).half.mode }))
+        Some((place, PwmStatus { tripped, released, mode: self.before(1).half.mode }))
     }
 
     /// Takes over from what the PWM interrupt loaded by itself, without pulses: at the boundary `at`, and at those after it that come before

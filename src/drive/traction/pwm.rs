@@ -6,7 +6,7 @@ use crate::frames::{Abc, UNITS_PER_RADIAN};
 use crate::machine::{Machine, Tables};
 use crate::modulation::{CarrierHalf, EdgeDelay, Mode, SwitchLimits, compensate};
 use crate::ports::PwmPort;
-use crate::protection::{self, DiodeWatch, Fault, MaskedFaults, OpenGates, SafeState, Trip, Violation};
+use crate::protection::{self, DiodeWatch, FailedCheck, Fault, MaskedFaults, OpenGates, SafeState, Trip};
 use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;
 
@@ -31,7 +31,7 @@ pub struct PwmTask<M = &'static Tables> {
     currents_a: Abc,
     currents_before_a: Abc,
     trip: Option<Trip>,
-    disarmed: MaskedFaults,
+    masked: MaskedFaults,
     /// Number of the release that was carried out last.
     released: u8,
     diodes: DiodeWatch,
@@ -51,14 +51,14 @@ impl<M: Machine> PwmTask<M> {
             currents_before_a: Abc { a: 0.0, b: 0.0, c: 0.0 },
             trip: None,
             diodes: DiodeWatch::new(),
-            disarmed: MaskedFaults::NONE,
+            masked: MaskedFaults::NONE,
             released: 0,
         }
     }
 
     /// The same without a check.
-    pub const fn without(mut self, disarmed: MaskedFaults) -> Self {
-        self.disarmed = disarmed;
+    pub const fn without(mut self, masked: MaskedFaults) -> Self {
+        self.masked = masked;
         self
     }
 
@@ -190,7 +190,7 @@ impl<M: Machine> PwmTask<M> {
         }
         let now = self.begins;
         let legs = port.leg_faults();
-        let armed = |(fault, _, _): &Violation| !self.disarmed.has(*fault);
+        let armed = |(fault, _, _): &FailedCheck| !self.masked.has(*fault);
         let currents = || protection::check_currents(&self.currents_a, &self.tables().ratings);
         let late = || {
             let pulses = newest.is_some_and(|half| !half.is_off());
@@ -203,8 +203,8 @@ impl<M: Machine> PwmTask<M> {
             let stale = || if pulses { stale(now, began, clock) } else { None };
             stale().or_else(|| unplanned(now, planned, clock))
         };
-        let violation = legs.check().or_else(|| currents().filter(armed)).or_else(|| late().filter(armed));
-        let Some((fault, value, limit)) = violation else {
+        let failed = legs.check().or_else(|| currents().filter(armed)).or_else(|| late().filter(armed));
+        let Some((fault, value, limit)) = failed else {
             return;
         };
         let (omega, udc_v) = self.told(newest);
@@ -259,14 +259,14 @@ impl<M: Machine> PwmTask<M> {
 }
 
 /// The control interrupt that should have come by `now` and has not: how long ago the last one began, in s.
-pub(in crate::drive) fn stale(now: Instant, began: Instant, clock: &Clock) -> Option<Violation> {
+pub(in crate::drive) fn stale(now: Instant, began: Instant, clock: &Clock) -> Option<FailedCheck> {
     let age = now.since(began);
     let limit = (clock.control_ticks + clock.control_ticks / CONTROL_LATE_PART) as i32;
     (age > limit).then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
 }
 
 /// The half that control should have planned for `now` and has not: how long ago the boundary of the newest one was, in s.
-fn unplanned(now: Instant, newest: Instant, clock: &Clock) -> Option<Violation> {
+fn unplanned(now: Instant, newest: Instant, clock: &Clock) -> Option<FailedCheck> {
     let age = now.since(newest);
     (age > 0).then(|| (Fault::StaleCommand, clock.seconds(age), 0.0))
 }

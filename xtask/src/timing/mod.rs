@@ -13,7 +13,7 @@ mod blocks;
 mod budget;
 pub mod drive;
 mod entry;
-mod kept;
+mod golden;
 mod log;
 pub mod meter;
 mod page;
@@ -64,12 +64,12 @@ pub fn run(args: &TimingArgs) -> Result<u8> {
             print!("{}", measured.profile_table(count)?);
         }
     }
-    let files = kept::files(&report);
+    let files = golden::files(&report);
     if args.write {
-        kept::write(&files)?;
+        golden::write(&files)?;
         return Ok(budget::exit_code(&judged));
     }
-    let complaints = kept::complaints(&files);
+    let complaints = golden::complaints(&files);
     for complaint in &complaints {
         eprintln!("{complaint}");
     }

@@ -26,7 +26,7 @@ mod firmware {
     use tractive::experiment::Memory;
     use tractive::identification::{Identification, Units};
     use tractive::modulation::SwitchLimits;
-    use tractive::protection::Violation;
+    use tractive::protection::FailedCheck;
     use tractive::protocol::CanEndpoint;
     use tractive::time::Instant;
 
@@ -53,9 +53,9 @@ mod firmware {
     }
 
     /// Starts the drive; the error is why it is refused.
-    fn start() -> Result<(), Violation> {
+    fn start() -> Result<(), FailedCheck> {
         let plan = Plan { shortest_half_ticks: settings().devices.shortest_half_ticks };
-        let found = board::prepare(plan).map_err(|error| error.violation())?;
+        let found = board::prepare(plan).map_err(|error| error.failed())?;
         CONTROL_ZEROS.keep(found.control_zeros);
         PWM_ZEROS.keep(found.pwm_zeros);
         board::run();

@@ -23,7 +23,7 @@ mod firmware {
     use nucleo_g474re::zs9::{self as board, Control, POSITION, Pwm, SHARED, settings};
     use nucleo_g474re::{Interrupt as interrupt, PULSE};
     use tractive::drive::dual::{ControlTask, PwmTask};
-    use tractive::protection::Violation;
+    use tractive::protection::FailedCheck;
 
     /// The zeros that the start measured, written before the interrupts are unmasked.
     static ZEROS: [AtomicU32; 7] = [const { AtomicU32::new(0) }; 7];
@@ -70,8 +70,8 @@ mod firmware {
     }
 
     /// Starts the drive; the error is why it is refused.
-    fn start() -> Result<(), Violation> {
-        keep(&board::prepare().map_err(|error| error.violation())?);
+    fn start() -> Result<(), FailedCheck> {
+        keep(&board::prepare().map_err(|error| error.failed())?);
         board::run();
         Ok(())
     }

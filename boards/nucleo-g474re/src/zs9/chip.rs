@@ -13,7 +13,7 @@ use crate::start::StartError;
 use crate::{Cycles, Interrupt, PULSE, die_on, join_bus, pause_a_slot, run_with};
 use tractive::drive::dual::Shared;
 use tractive::operator::{self, Configuration, DualSlot, Line, slot_s};
-use tractive::protection::Violation;
+use tractive::protection::FailedCheck;
 use tractive::protocol::{TO_ZS9, Zs9CanEndpoint};
 use tractive::recorder::DualRecorder;
 
@@ -39,7 +39,7 @@ pub fn run() {
 
 /// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the
 /// flight recorder holds. Where the start was `refused` it says why to whoever asks on the bus.
-pub fn idle(refused: Option<Violation>) -> ! {
+pub fn idle(refused: Option<FailedCheck>) -> ! {
     let line =
         Line::rated(&RATINGS, STAGE.common.line.precharge_s, STAGE.common.line.discharge_s).without_chopper();
     let rated = operator::Settings::rated(&RATINGS, slot_s(&CLOCK), Some(line));

@@ -6,7 +6,7 @@ use crate::switchgear;
 use tractive::drive::DualOperatorMailboxes;
 use tractive::operator::{DualDemands, DualRequest, DualSlot, DualStatus, Feedback, OperatorPort, Settings};
 use tractive::ports::DualReport;
-use tractive::protection::Violation;
+use tractive::protection::FailedCheck;
 use tractive::protocol::Zs9CanEndpoint;
 use tractive::time::Instant;
 
@@ -31,7 +31,7 @@ impl DualServe<'_> {
     }
 
     /// As [`Serve::refuse`].
-    pub fn refuse(&mut self, slot: &mut DualSlot, why: Violation, rated: &Settings) {
+    pub fn refuse(&mut self, slot: &mut DualSlot, why: FailedCheck, rated: &Settings) {
         self.collect();
         slot.refuse(why, self, rated, &CLOCK);
     }

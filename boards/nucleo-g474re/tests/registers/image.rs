@@ -565,7 +565,7 @@ fn a_start_that_is_refused_is_told_on_the_bus_and_every_command_is_answered() {
     let mut image = Image::reset(0.3, 0.0, Angle::ZERO);
     let line = Line::rated(&BUILT_IN.ratings, PRECHARGE_S, DISCHARGE_S);
     let rated = operator::Settings::rated(&BUILT_IN.ratings, slot_s(&CLOCK), Some(line));
-    let why = StartError::WatchdogReset.violation();
+    let why = StartError::WatchdogReset.failed();
     let mut value = None;
     for (command, refusal) in [
         (REST, None),

@@ -64,9 +64,9 @@ fn halves_of_all_modes(direction: f32) -> Vec<CarrierHalf> {
     let (mut angle, mut hz) = (Angle::ZERO, 3.0_f32);
     for _ in 0..200_000 {
         let rate = direction * hz * 4_294_967_296.0 / CLOCK.ticks_per_s;
-        let depth = (hz / 120.0).min(1.05);
-        let turning = Reference::turning(depth.min(1.0) * 954.9, angle, rate, start, 1_500.0);
-        let reference = Reference { depth, ..turning };
+        let modulation_index = (hz / 120.0).min(1.05);
+        let turning = Reference::turning(modulation_index.min(1.0) * 954.9, angle, rate, start, 1_500.0);
+        let reference = Reference { modulation_index, ..turning };
         let half = modulator.step(start, Some(&reference));
         if found.iter().filter(|other| other.mode == half.mode).count() < 24 {
             found.push(half);

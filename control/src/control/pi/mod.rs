@@ -22,7 +22,7 @@
 //! let law = Law { gains: &Gains::DEFAULT, clock: &clock, tables: &tables };
 //! let limits = ModeLimits {
 //!     follows: Regulated::Mean,
-//!     depth_limit: 0.9,
+//!     index_limit: 0.9,
 //!     # steady_share: 1.0,
 //!     # filled: false,
 //!     # ripple_share: 0.05,
@@ -191,15 +191,15 @@ impl ControlLaw for PiLaw {
         let before_v = self.link_v.unwrap_or(udc_v);
         let link_v = before_v + LINK_RAD_S * period_s * (udc_v - before_v);
         self.link_v = Some(link_v);
-        let limit_v = limits.depth_limit * limits.steady_share * six_step_v(link_v);
+        let limit_v = limits.index_limit * limits.steady_share * six_step_v(link_v);
         let point = self.reference.step(wanted_nm, self.weakening.moved_a(), tables);
         self.target = Target {
             torque_nm: point.torque_nm,
             current: point.current,
             flux: point.flux,
             region: point.region,
-            depth: point.mtpa_voltage_v(omega, tables) / six_step_v(link_v),
-            voltage_limit_v: limits.depth_limit * six_step_v(udc_v),
+            modulation_index: point.mtpa_voltage_v(omega, tables) / six_step_v(link_v),
+            voltage_limit_v: limits.index_limit * six_step_v(udc_v),
         };
         self.limit_v = limit_v;
     }

@@ -198,7 +198,7 @@ impl Case {
         }
         Cell {
             share,
-            index: Passed::of(seen.depth, self.indices(seen.rate)),
+            index: Passed::of(seen.modulation_index, self.indices(seen.rate)),
             made: (!made.is_nan()).then(|| Passed::of(made, self.indices(0.0))),
         }
     }
@@ -210,9 +210,13 @@ impl Case {
         let mut choices = BTreeMap::<Cell, Choice>::new();
         for rate in self.rates() {
             let borders = self.indices(rate).flat_map(|(up, down)| [up, down]);
-            let depths = cells(borders.chain([0.5]).collect());
-            for (depth, volts) in depths.iter().flat_map(|depth| voltages.iter().map(move |v| (*depth, *v))) {
-                let seen = Reference { rate, depth, voltage_v: volts, udc_v: LINK_V, ..Reference::NONE };
+            let indices = cells(borders.chain([0.5]).collect());
+            for (modulation_index, volts) in indices
+                .iter()
+                .flat_map(|modulation_index| voltages.iter().map(move |v| (*modulation_index, *v)))
+            {
+                let seen =
+                    Reference { rate, modulation_index, voltage_v: volts, udc_v: LINK_V, ..Reference::NONE };
                 let chosen = |mode: &Mode| self.schedule().wanted(Instant(0), *mode, &seen, &self.devices);
                 let cell = self.cell(&seen);
                 let next: Vec<u8> = modes.iter().map(|mode| place(&modes, chosen(mode))).collect();
@@ -420,7 +424,7 @@ fn what_is_no_number_counts_as_the_lowest_rung() {
     for case in Case::all().into_iter().filter(|case| case.ladder.modes().count() > 1) {
         let lowest = case.ladder.modes().nth(1);
         let rate = |hz: f32| hz * 4_294_967_296.0 / 25e6;
-        for (rate, depth, wanted) in [
+        for (rate, modulation_index, wanted) in [
             (f32::NAN, 0.0, lowest),
             (f32::NAN, f32::NAN, lowest),
             (rate(50.0), f32::NAN, lowest),
@@ -428,7 +432,8 @@ fn what_is_no_number_counts_as_the_lowest_rung() {
             (f32::NEG_INFINITY, 1.0, Some(Mode::Async)),
             (f32::INFINITY, f32::NAN, case.ladder.modes().last()),
         ] {
-            let seen = Reference { rate, depth, voltage_v: 900.0, udc_v: LINK_V, ..Reference::NONE };
+            let seen =
+                Reference { rate, modulation_index, voltage_v: 900.0, udc_v: LINK_V, ..Reference::NONE };
             for mode in case.ladder.modes().filter(|mode| !mode.is_optimal()) {
                 let found = case.schedule().wanted(Instant(0), mode, &seen, &case.devices);
                 assert_eq!(Some(found), wanted, "{mode:?} {seen:?}");
@@ -445,12 +450,12 @@ fn the_shortest_pulse_takes_its_part_of_the_fundamental() {
         let rate = (hz * 4_294_967_296.0 / 25e6) as f32;
         let half_notch = (core::f64::consts::PI * f64::abs(hz) * f64::from(min_pulse_ticks) / 25e6).sin();
         for (mode, sum) in [(Mode::Mid7, 5.758_77), (Mode::Mid5, 3.863_703), (Mode::Mid3, 2.0)] {
-            let off = f64::from(depth_limit(mode, rate, &devices)) - (1.0 - sum * half_notch);
+            let off = f64::from(index_limit(mode, rate, &devices)) - (1.0 - sum * half_notch);
             assert!(off.abs() < 2e-6, "{mode:?} {hz} Hz, {min_pulse_ticks}: {off}");
         }
-        assert_eq!(depth_limit(Mode::Square, rate, &devices), 1.0);
+        assert_eq!(index_limit(Mode::Square, rate, &devices), 1.0);
         for carrier in [Mode::Async, Mode::Sync15, Mode::Sync12] {
-            assert_eq!(depth_limit(carrier, rate, &devices), 0.906_899_7);
+            assert_eq!(index_limit(carrier, rate, &devices), 0.906_899_7);
         }
     }
 }
@@ -464,7 +469,7 @@ fn an_optimised_pattern_is_kept_down_to_its_smallest_index() {
         let least_v = first(f32::MAX, |volts| made(volts) >= branch.first);
         for (voltage_v, wanted) in [(least_v, mode), (least_v.next_down(), Mode::Async)] {
             // So slow that it is the free carrier's turn.
-            let seen = Reference { voltage_v, depth: 0.9, udc_v: LINK_V, ..Reference::NONE };
+            let seen = Reference { voltage_v, modulation_index: 0.9, udc_v: LINK_V, ..Reference::NONE };
             let mut schedule = case.schedule();
             schedule.switched(Instant(0));
             assert_eq!(schedule.wanted(Instant(1), mode, &seen, &case.devices), wanted, "{mode:?}");

@@ -2,16 +2,17 @@
 
 mod allowed;
 mod cases;
+mod drive_cycle;
 mod faults;
-mod ride;
 
 pub use cases::{Case, cases};
+pub use drive_cycle::{CycleResult, DriveCycle, Script};
 pub use faults::{Cause, faults};
-pub use ride::{Ridden, Ride, Script};
 
 use super::Outcome;
 use super::action::{LEAD_S, Stages};
 use super::outcome::{Seen, Setting};
+use crate::ablation::Ablation;
 use crate::bench::{Flaws, Limits, Simulated};
 use crate::inject::Injection;
 use crate::inject::zs9::Kind;
@@ -21,7 +22,6 @@ use crate::plant::{PlantSettings, SpeedSource};
 use crate::run::{CLOCK, Interrupts};
 use crate::scenario::System;
 use crate::scenario::zs9::{SOURCE_V, Zs9};
-use crate::without::Ablation;
 use crate::zs9::bench::{Bench, BenchSettings};
 use crate::zs9::run::Tasks;
 use crate::zs9::trace::Row;

@@ -89,7 +89,7 @@ pub fn run(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
         let configuration = serde_json::json!({
             "minutes": minutes,
             "only": options.only,
-            "without": options.without.map(crate::without::Ablation::name),
+            "without": options.without.map(crate::ablation::Ablation::name),
             "blocks": options.blocks,
             "patterns": options.patterns,
             "seed": options.seed,
@@ -138,9 +138,9 @@ fn tell(driven: &[Piece], minutes: f64, json: bool) -> Result<bool> {
     Ok(driven.iter().all(|piece| piece.tripped.is_empty()))
 }
 
-/// Writes rides.csv of shards that are merged, and prints what `campaign --healthy` prints; `true` if nothing tripped.
+/// Writes cycles.csv of shards that are merged, and prints what `campaign --healthy` prints; `true` if nothing tripped.
 pub fn merged(merged: &Merged, out: &Path, json: bool) -> Result<bool> {
-    write_text(&out.join("rides.csv"), &merged.csv())?;
+    write_text(&out.join("cycles.csv"), &merged.csv())?;
     let minutes = merged.plan.configuration.get("minutes").and_then(serde_json::Value::as_f64);
     tell(&merged.read()?, minutes.context("a configuration without its minutes")?, json)
 }

@@ -1,7 +1,7 @@
-//! Random rides of the ZS9.
+//! Random cycles of the ZS9.
 
 use super::{Driven, corners, flaws, jumped, named, torques};
-use crate::campaign::dual::{Drive, Ridden, Ride, Script};
+use crate::campaign::dual::{CycleResult, Drive, DriveCycle, Script};
 use crate::zs9::bench::Course;
 use anyhow::Result;
 use rand::rngs::StdRng;
@@ -22,9 +22,9 @@ const SOURCE_JUMP_V: f64 = 80.0;
 /// Noise of the current sensors, in A rms.
 const NOISE_A: f64 = 0.2;
 
-/// A random ride: each motor follows torques that jump or are slewed from one sign to the other at a speed that goes up and down, or
+/// A random cycle: each motor follows torques that jump or are slewed from one sign to the other at a speed that goes up and down, or
 /// follows a speed with a load that jumps; the source jumps and the scheme changes.
-pub fn ride(drive: &Drive, duration_s: f64, seed: u64) -> Ride {
+pub fn cycle(drive: &Drive, duration_s: f64, seed: u64) -> DriveCycle {
     let parameters = &drive.machine.folder.parameters;
     let mut random = StdRng::seed_from_u64(seed);
     let motors = [0, 1].map(|_| {
@@ -49,7 +49,7 @@ pub fn ride(drive: &Drive, duration_s: f64, seed: u64) -> Ride {
         t_s += random.random_range(0.3..3.0);
         course.schemes.push((t_s, Scheme::ALL[random.random_range(0..Scheme::ALL.len())]));
     }
-    Ride { motors, course, duration_s }
+    DriveCycle { motors, course, duration_s }
 }
 
 fn by_speed(random: &mut StdRng, duration_s: f64) -> Script {
@@ -67,20 +67,20 @@ fn by_speed(random: &mut StdRng, duration_s: f64) -> Script {
 const STEP_S: f64 = 1e-3;
 
 /// Drives it; the trip in the end is what must not be.
-pub fn drive(drive: &Drive, duration_s: f64, seed: u64) -> Result<Ridden> {
+pub fn drive(drive: &Drive, duration_s: f64, seed: u64) -> Result<CycleResult> {
     let trip_current_a = drive.machine.folder.parameters.trip_current_a;
-    drive.ride(ride(drive, duration_s, seed), flaws(trip_current_a, NOISE_A, seed), STEP_S, 0)
+    drive.cycle(cycle(drive, duration_s, seed), flaws(trip_current_a, NOISE_A, seed), STEP_S, 0)
 }
 
-impl From<Ridden> for Driven {
-    fn from(ridden: Ridden) -> Self {
-        let tripped = ridden.trip.map(|trip| {
-            let last = ridden.rows.last();
+impl From<CycleResult> for Driven {
+    fn from(driven: CycleResult) -> Self {
+        let tripped = driven.trip.map(|trip| {
+            let last = driven.rows.last();
             let [upper, lower] =
                 last.map_or([f64::NAN; 2], |row| row.motors.each_ref().map(|motor| motor.speed_rpm));
             let scheme = last.map_or("", |row| row.scheme.name());
-            format!("{} at {:.3} s, {upper:.0} and {lower:.0} r/min, {scheme}", named(trip), ridden.ended_s)
+            format!("{} at {:.3} s, {upper:.0} and {lower:.0} r/min, {scheme}", named(trip), driven.ended_s)
         });
-        Self { peaks: ridden.observed.until, tripped }
+        Self { peaks: driven.observed.until, tripped }
     }
 }

@@ -9,10 +9,10 @@ use rand::Rng;
 use rand::rngs::StdRng;
 use tractive::protection::Trip;
 
-/// The results of a ride.
+/// The results of a cycle.
 #[derive(Clone, Debug)]
 pub struct Driven {
-    /// Extremes of the ride.
+    /// Extremes of the cycle.
     pub peaks: Peaks,
     /// The trip, where and in which mode, if there was one.
     pub tripped: Option<String>,

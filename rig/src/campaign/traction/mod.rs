@@ -3,18 +3,19 @@
 mod allowed;
 mod cases;
 mod conditions;
+mod drive_cycle;
 mod faults;
 pub mod random;
-mod ride;
 mod sensors;
 
 pub use cases::{Case, cases};
 pub use conditions::Conditions;
-pub use ride::{Ridden, Ride};
+pub use drive_cycle::{CycleResult, DriveCycle};
 
 use super::Outcome;
 use super::action::{FAULT_S, LEAD_S, Stages};
 use super::outcome::{Seen, Setting};
+use crate::ablation::Ablation;
 use crate::bench::{self, Bench, Flaws, Limits, Simulated, Supply};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
@@ -25,7 +26,6 @@ use crate::run::{CLOCK, Interrupts};
 use crate::scenario::System;
 use crate::scenario::traction::{PatternsName, Traction};
 use crate::trace::Row;
-use crate::without::Ablation;
 use anyhow::Result;
 pub use faults::{Cause, faults};
 use tractive::control::Demand;

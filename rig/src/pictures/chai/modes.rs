@@ -11,7 +11,7 @@ use crate::trace::Recording;
 use crate::verdict::worst;
 use anyhow::Result;
 use core::f64::consts::{FRAC_2_PI, TAU};
-use tractive::modulation::{Ladder, Mode, depth_limit};
+use tractive::modulation::{Ladder, Mode, index_limit};
 
 const COLOURS: [Colour; 6] = [GREY, BLUE, GREEN, ORANGE, VIOLET, RED];
 
@@ -125,7 +125,7 @@ pub fn every_mode(machine: &Machine) -> Result<String> {
         let share = if mode.is_whole() {
             1.0
         } else {
-            (f1_hz / base_hz).min(f64::from(depth_limit(mode, rate, &limits)))
+            (f1_hz / base_hz).min(f64::from(index_limit(mode, rate, &limits)))
         };
         let edges = pulses(machine, mode, f1_hz, share)?;
         let line = line_voltage(&edges, f1_hz, udc_v);

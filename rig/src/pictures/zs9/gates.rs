@@ -44,11 +44,11 @@ pub fn voltages(legs: [i8; 3]) -> [Point; 2] {
     })
 }
 
-/// A period's gates for two motors, their voltages' angles in degrees beside their depths.
+/// A period's gates for two motors, their voltages' angles in degrees beside their indices.
 pub fn period(scheme: Scheme, upper: (f64, f32), lower: (f64, f32), shoot_through: f32) -> Option<Period> {
-    let motor = |(degrees, depth): (f64, f32)| MotorVoltage {
+    let motor = |(degrees, modulation_index): (f64, f32)| MotorVoltage {
         angle: Angle::from_radians((degrees / 360.0 * TAU) as f32),
-        depth,
+        modulation_index,
     };
     step(&Request { scheme, upper: motor(upper), lower: motor(lower), shoot_through }).ok()
 }

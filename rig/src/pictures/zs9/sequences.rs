@@ -8,7 +8,7 @@ use super::gates::{FIRST_ZERO, is_on, leg, period, steps, vectors};
 use anyhow::{Context, Result};
 use tractive::nine_switch::{GATES, Period, Scheme};
 
-/// Angles in degrees and depths of the upper and the lower motor in the sequences: sector I for both, as in the paper.
+/// Angles in degrees and indices of the upper and the lower motor in the sequences: sector I for both, as in the paper.
 const UPPER: (f64, f32) = (20.0, 0.4);
 const LOWER: (f64, f32) = (40.0, 0.3);
 /// The shoot-through duty that is drawn.
@@ -177,8 +177,10 @@ pub fn shoot_through(scheme: Scheme) -> Result<String> {
 /// Figure 2: time-sharing. Two references that never cross on one carrier, and the half of the period that each motor has.
 pub fn figure2() -> Result<String> {
     const CARRIERS: f64 = 18.0;
-    let depth = 0.5;
-    let at = |turns: f64| made(Scheme::S, (360.0 * turns, depth), (252.0 * turns, depth), 0.0);
+    let modulation_index = 0.5;
+    let at = |turns: f64| {
+        made(Scheme::S, (360.0 * turns, modulation_index), (252.0 * turns, modulation_index), 0.0)
+    };
     let axes =
         (Axis::of("turns of the upper motor's voltage", 0.0, 1.0), Axis::of("carrier's level", 0.0, 1.0));
     let mut first =

@@ -1,8 +1,8 @@
 //! The PMaSynRM drive's tasks on its bench.
 
+use crate::ablation::Ablation;
 use crate::bench::{Bench, Sampled, Simulated};
 use crate::run::{Interrupts, Supervisor, turn};
-use crate::without::Ablation;
 use anyhow::Result;
 use tractive::control::{ControlLaw, Controller};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
@@ -258,8 +258,8 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
 
     /// The same with a protection off, or none; its levels are the tables' business.
     pub fn without(self, without: Option<Ablation>) -> Self {
-        let disarmed = without.map_or(MaskedFaults::NONE, Ablation::disarmed);
-        let (control, pwm) = (self.control.without(disarmed), self.pwm.without(disarmed));
+        let masked = without.map_or(MaskedFaults::NONE, Ablation::masked);
+        let (control, pwm) = (self.control.without(masked), self.pwm.without(masked));
         Self { control, pwm, without, ..self }
     }
 

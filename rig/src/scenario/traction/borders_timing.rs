@@ -1,4 +1,4 @@
-//! A short drive to and fro across each border between two modes, and in and out of pulses, for `cargo xtask test --only landings`: what
+//! A short drive to and fro across each border between two modes, and in and out of pulses, for `cargo xtask test --only preemption`: what
 //! control executes while a mode changes and no longer.
 
 use super::prelude::*;

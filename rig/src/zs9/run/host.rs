@@ -1,8 +1,8 @@
 //! The ZS9's tasks on its bench.
 
+use crate::ablation::Ablation;
 use crate::bench::Simulated;
 use crate::run::{Interrupts, Supervisor, turn};
-use crate::without::Ablation;
 use crate::zs9::bench::Bench;
 use anyhow::Result;
 use tractive::control::{ControlLaw, Controller};
@@ -222,8 +222,8 @@ impl<'a, L: ControlLaw + Copy> Tasks<'a, L> {
 
     /// The same with a protection off, or none; its levels are the tables' and the settings' business.
     pub fn without(self, without: Option<Ablation>) -> Self {
-        let disarmed = without.map_or(MaskedFaults::NONE, Ablation::disarmed);
-        Self { control: self.control.without(disarmed), pwm: self.pwm.without(disarmed), ..self }
+        let masked = without.map_or(MaskedFaults::NONE, Ablation::masked);
+        Self { control: self.control.without(masked), pwm: self.pwm.without(masked), ..self }
     }
 
     /// The latched fault.

@@ -5,7 +5,7 @@ use crate::control::{ControlLaw, Measurements};
 use crate::frames::Angle;
 use crate::machine::Machine;
 use crate::ports::{ControlPort, DriveCommand, Sample};
-use crate::protection::{self, OpenGates, Trip, Violation};
+use crate::protection::{self, FailedCheck, OpenGates, Trip};
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
@@ -16,7 +16,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         angle: Option<Angle>,
         enable: bool,
         port: &mut impl ControlPort,
-    ) -> (f32, Option<Violation>) {
+    ) -> (f32, Option<FailedCheck>) {
         let clock = self.settings.clock;
         let followed = angle.map(|angle| (angle, self.controller.innovation(angle, &clock)));
         if let Some((_, innovation)) = followed {
@@ -51,7 +51,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         command: &DriveCommand,
         measured: &Measurements,
         omega: f32,
-    ) -> Option<Violation> {
+    ) -> Option<FailedCheck> {
         if protection::is_sound(measured, omega, &command.demand, &self.machine.tables().ratings) {
             return None;
         }
@@ -63,7 +63,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// The same for an input that may have one.
     #[cold]
     #[inline(never)]
-    fn find_fault(&self, command: &DriveCommand, measured: &Measurements, omega: f32) -> Option<Violation> {
+    fn find_fault(&self, command: &DriveCommand, measured: &Measurements, omega: f32) -> Option<FailedCheck> {
         let ratings = &self.machine.tables().ratings;
         let empty =
             || if command.enable { protection::check_undervoltage(measured.udc_v, ratings) } else { None };
@@ -73,18 +73,18 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// Nothing where the check that found it is switched off.
-    pub(super) fn armed(&self, violation: Option<Violation>) -> Option<Violation> {
-        violation.filter(|(fault, _, _)| !self.disarmed.has(*fault))
+    pub(super) fn armed(&self, failed: Option<FailedCheck>) -> Option<FailedCheck> {
+        failed.filter(|(fault, _, _)| !self.masked.has(*fault))
     }
 
     pub(super) fn check(
         &mut self,
-        violation: Option<Violation>,
+        failed: Option<FailedCheck>,
         sample: &Sample,
         port: &mut impl ControlPort,
     ) {
-        if let (Some(violation), None) = (violation, self.trip) {
-            self.trip_on(violation, sample, port);
+        if let (Some(failed), None) = (failed, self.trip) {
+            self.trip_on(failed, sample, port);
         }
     }
 
@@ -93,11 +93,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     #[inline(never)]
     pub(super) fn trip_on(
         &mut self,
-        (fault, value, limit): Violation,
+        (fault, value, limit): FailedCheck,
         sample: &Sample,
         port: &mut impl ControlPort,
     ) {
-        if self.disarmed.has(fault) {
+        if self.masked.has(fault) {
             return;
         }
         let at = self.now.before(self.settings.clock.control_ticks);

@@ -105,8 +105,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let Settings { gains, clock, .. } = &self.settings;
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
         let tables = self.machine.tables();
-        let steady =
-            Steady { omega, udc_v: udc_v * self.link_scale, voltage_v: self.steady_v, depth: self.depth };
+        let steady = Steady {
+            omega,
+            udc_v: udc_v * self.link_scale,
+            voltage_v: self.steady_v,
+            modulation_index: self.modulation_index,
+        };
         let passed_s = self.controller.passed_s(clock);
         self.limits = limits(&slot.key, &steady, &mut self.exit, &self.settings, passed_s);
         let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
@@ -125,7 +129,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         };
         self.controller.aim(&aim, &Law { gains, clock, tables });
         let target = self.controller.target();
-        self.depth = target.depth;
+        self.modulation_index = target.modulation_index;
         self.link_scale = self.controller.link_scale();
         self.exit.drove(target.torque_nm);
         self.aimed = Some(slot.key);
@@ -138,7 +142,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         // The instant of the currents.
         let now = slot.now.before(self.delay.ticks);
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v * self.link_scale);
-        let steady = Steady { omega, udc_v, voltage_v: self.steady_v, depth: self.depth };
+        let steady =
+            Steady { omega, udc_v, voltage_v: self.steady_v, modulation_index: self.modulation_index };
         let (mode, revises) = (slot.key.mode, self.revises);
         let wanted = Wanted { mode, revises, between: slot.between, before: &self.reference };
         let committed = committed(&self.pulses, now, &steady, &self.settings, &wanted);
@@ -155,7 +160,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             rate: clock.angle_rate(omega),
             at: now,
             udc_v,
-            depth: self.depth,
+            modulation_index: self.modulation_index,
         };
     }
 
@@ -206,7 +211,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             rate: self.settings.clock.angle_rate(omega),
             at: now.before(self.delay.ticks),
             udc_v: measured.udc_v,
-            depth: omega.abs() * self.machine.tables().ratings.magnet_flux_wb / six_step_v(measured.udc_v),
+            modulation_index: omega.abs() * self.machine.tables().ratings.magnet_flux_wb
+                / six_step_v(measured.udc_v),
             ..Reference::NONE
         };
         self.harmonics.pause();

@@ -5,7 +5,7 @@ use super::ControlTask;
 use crate::control::ControlLaw;
 use crate::frames::{AlphaBeta, six_step_v};
 use crate::machine::Machine;
-use crate::modulation::{Mode, Reference, depth_limit};
+use crate::modulation::{Mode, Reference, index_limit};
 use crate::ports::{ControlPort, Sample};
 use crate::protection::Fault;
 use crate::start_up::{StartUp, StartUpInput, StartUpStep};
@@ -63,7 +63,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if commands == Some(true) {
             let devices = &self.settings.devices;
             let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
-            let limit_v = USED_SHARE * depth_limit(Mode::Async, 0.0, devices) * six_step_v(sample.udc_v);
+            let limit_v = USED_SHARE * index_limit(Mode::Async, 0.0, devices) * six_step_v(sample.udc_v);
             let interval_s = if shortest_s < clock.control_s() { clock.control_s() } else { shortest_s };
             let ratings = &self.machine.tables().ratings;
             match starting.law.step(&StartUpInput { turned, limit_v, interval_s, ratings }) {

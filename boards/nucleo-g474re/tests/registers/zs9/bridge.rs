@@ -74,9 +74,11 @@ fn off() -> PlayedPeriod {
     PlayedPeriod::off(settings().half_steps())
 }
 
-fn request(scheme: Scheme, degrees: [f32; 2], depths: [f32; 2], shoot_through: f32) -> Request {
-    let voltage =
-        |k: usize| MotorVoltage { angle: Angle::from_radians(degrees[k].to_radians()), depth: depths[k] };
+fn request(scheme: Scheme, degrees: [f32; 2], indices: [f32; 2], shoot_through: f32) -> Request {
+    let voltage = |k: usize| MotorVoltage {
+        angle: Angle::from_radians(degrees[k].to_radians()),
+        modulation_index: indices[k],
+    };
     Request { scheme, upper: voltage(0), lower: voltage(1), shoot_through }
 }
 
@@ -277,17 +279,17 @@ fn what_the_timers_cannot_play_turns_the_gates_off() {
 fn requests() -> impl Strategy<Value = Request> {
     let scheme = (0..SCHEMES.len()).prop_map(|index| SCHEMES[index]);
     // Often on the borders of what there is, and often without voltage or shoot-through.
-    let depth = || prop_oneof![3 => 0.0_f32..0.6, 1 => Just(0.0), 1 => 0.55_f32..2.0];
+    let modulation_index = || prop_oneof![3 => 0.0_f32..0.6, 1 => Just(0.0), 1 => 0.55_f32..2.0];
     let duty = prop_oneof![3 => 0.0_f32..0.4, 1 => Just(0.0), 1 => 0.0_f32..0.05, 1 => 0.9_f32..=1.0];
     let angle = || prop_oneof![3 => any::<u32>(), 1 => (0_u32..12).prop_map(|k| (u64::from(k) * (1 << 32) / 12) as u32)];
-    (scheme, angle(), angle(), depth(), depth(), duty).prop_map(|(scheme, a1, a2, m1, m2, shoot_through)| {
-        Request {
+    (scheme, angle(), angle(), modulation_index(), modulation_index(), duty).prop_map(
+        |(scheme, a1, a2, m1, m2, shoot_through)| Request {
             scheme,
-            upper: MotorVoltage { angle: Angle(a1), depth: m1 },
-            lower: MotorVoltage { angle: Angle(a2), depth: m2 },
+            upper: MotorVoltage { angle: Angle(a1), modulation_index: m1 },
+            lower: MotorVoltage { angle: Angle(a2), modulation_index: m2 },
             shoot_through,
-        }
-    })
+        },
+    )
 }
 
 #[derive(Clone, Debug)]

@@ -81,7 +81,7 @@ impl Ablation {
     }
 
     /// The checks that the tasks leave out.
-    pub fn disarmed(self) -> MaskedFaults {
+    pub fn masked(self) -> MaskedFaults {
         match self {
             // These are levels: out of reach.
             Self::Check(

@@ -13,8 +13,8 @@ const MOVED: f64 = 10.0;
 /// Sizes are kept rounded up to a multiple of this many bytes.
 const GRAIN: u64 = 256;
 
-/// A kept file, as it should be now.
-pub struct Kept {
+/// A golden file, as it should be now.
+pub struct Golden {
     path: PathBuf,
     text: String,
     /// `true` if numbers may only fall (sizes); if not, they may move a little either way.
@@ -22,11 +22,11 @@ pub struct Kept {
 }
 
 /// The files by what was measured.
-pub fn files(report: &Report) -> [Kept; 2] {
+pub fn files(report: &Report) -> [Golden; 2] {
     let file = |name: &str| build::root().join(name);
     [
-        Kept { path: file("docs/cost.md"), text: page::text(report), falls: false },
-        Kept { path: file("sizes.toml"), text: sizes(report), falls: true },
+        Golden { path: file("docs/cost.md"), text: page::text(report), falls: false },
+        Golden { path: file("sizes.toml"), text: sizes(report), falls: true },
     ]
 }
 
@@ -49,16 +49,16 @@ fn sizes(report: &Report) -> String {
 }
 
 /// Writes them.
-pub fn write(files: &[Kept]) -> Result<()> {
-    for Kept { path, text, .. } in files {
+pub fn write(files: &[Golden]) -> Result<()> {
+    for Golden { path, text, .. } in files {
         std::fs::write(path, text).with_context(|| path.display().to_string())?;
     }
     Ok(())
 }
 
 /// The lines that do not fit.
-pub fn complaints(files: &[Kept]) -> Vec<String> {
-    let complaint = |file: &Kept| {
+pub fn complaints(files: &[Golden]) -> Vec<String> {
+    let complaint = |file: &Golden| {
         let found = std::fs::read_to_string(&file.path).unwrap_or_default();
         let differs = difference(&found, &file.text, file.falls)?;
         Some(format!("{}: {differs}; `cargo xtask timing --write` writes it anew", file.path.display()))
@@ -67,21 +67,21 @@ pub fn complaints(files: &[Kept]) -> Vec<String> {
 }
 
 /// The first line that is out of date.
-fn difference(kept: &str, now: &str, falls: bool) -> Option<String> {
-    let (kept_lines, now_lines): (Vec<_>, Vec<_>) = (kept.lines().collect(), now.lines().collect());
-    if kept_lines.len() != now_lines.len() {
-        return Some(format!("{} lines, {} now", kept_lines.len(), now_lines.len()));
+fn difference(golden: &str, now: &str, falls: bool) -> Option<String> {
+    let (golden_lines, now_lines): (Vec<_>, Vec<_>) = (golden.lines().collect(), now.lines().collect());
+    if golden_lines.len() != now_lines.len() {
+        return Some(format!("{} lines, {} now", golden_lines.len(), now_lines.len()));
     }
-    let same = |(kept, now): (&str, &str)| match (kept.parse::<f64>(), now.parse::<f64>()) {
-        (Ok(kept), Ok(now)) if falls => now <= kept,
-        (Ok(kept), Ok(now)) => (now - kept).abs() <= (MOVED_SHARE * kept).max(MOVED),
-        _ => kept == now,
+    let same = |(golden, now): (&str, &str)| match (golden.parse::<f64>(), now.parse::<f64>()) {
+        (Ok(golden), Ok(now)) if falls => now <= golden,
+        (Ok(golden), Ok(now)) => (now - golden).abs() <= (MOVED_SHARE * golden).max(MOVED),
+        _ => golden == now,
     };
-    let line = kept_lines.iter().zip(&now_lines).find(|(kept, now)| {
-        let (kept, now): (Vec<_>, Vec<_>) = (kept.split(' ').collect(), now.split(' ').collect());
-        kept.len() != now.len() || !kept.into_iter().zip(now).all(same)
+    let line = golden_lines.iter().zip(&now_lines).find(|(golden, now)| {
+        let (golden, now): (Vec<_>, Vec<_>) = (golden.split(' ').collect(), now.split(' ').collect());
+        golden.len() != now.len() || !golden.into_iter().zip(now).all(same)
     });
-    line.map(|(kept, now)| format!("`{kept}` is now `{now}`"))
+    line.map(|(golden, now)| format!("`{golden}` is now `{now}`"))
 }
 
 #[cfg(test)]

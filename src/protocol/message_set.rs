@@ -57,7 +57,7 @@ pub type Request<D> = <<D as MessageSet>::Demands as Demands>::Request;
 /// The drive's report of itself.
 pub type Report<D> = <<D as MessageSet>::Demands as Demands>::Report;
 /// The operator's status of the demands.
-pub type Told<D> = <<D as MessageSet>::Demands as Demands>::Told;
+pub type DemandStatus<D> = <<D as MessageSet>::Demands as Demands>::Status;
 
 /// The consequence of a frame's content.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! The drive's end of the protocol beside the operator: what the reports become in telemetry, the parameters in settings.
 
-use super::dialect::{MessageSet, Report, Request, Told as DriveTold};
 use super::frame::Frame;
+use super::message_set::{DemandStatus, MessageSet, Report, Request};
 use super::parameters::Parameters;
-use super::session::{Session, Told};
+use super::session::{Session, TelemetrySource};
 use super::telemetry::Counts;
 use crate::machine::Ratings;
 use crate::operator::{Settings, Status};
@@ -45,8 +45,8 @@ impl<D: MessageSet> CanEndpoint<D> {
     }
 
     /// The frame to send after the slot, if one is due; with the drive's report at the slot's beginning.
-    pub fn tell(&mut self, status: &Status<DriveTold<D>>, report: Option<&Report<D>>) -> Option<Frame> {
+    pub fn tell(&mut self, status: &Status<DemandStatus<D>>, report: Option<&Report<D>>) -> Option<Frame> {
         let (measured, mode) = D::observed(report, status.temperatures.as_ref(), self.ratings);
-        self.session.tell(&Told { status, measured: &measured, mode })
+        self.session.tell(&TelemetrySource { status, measured: &measured, mode })
     }
 }

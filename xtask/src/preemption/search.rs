@@ -9,13 +9,13 @@ use std::collections::{HashMap, HashSet};
 type Wanted<'a> = (bool, &'a str, u32);
 
 /// The control interrupts of a run, and what is known of them.
-pub struct Hunt<'a> {
+pub struct Search<'a> {
     pub stands: Vec<Stand<'a>>,
     /// From the ticks that are left, in instructions, to [`Stand::boundary`]: the same for all that begin as their timer comes.
     usual: u32,
 }
 
-impl<'a> Hunt<'a> {
+impl<'a> Search<'a> {
     pub fn new(stands: Vec<Stand<'a>>) -> Self {
         Self { stands, usual: NEAR }
     }
@@ -95,7 +95,7 @@ impl<'a> Hunt<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::landings::Call;
+    use crate::preemption::Call;
 
     /// Ten instructions from 0 on, the samples before the sixth, a link of thirty between.
     fn call() -> Call {
@@ -116,12 +116,12 @@ mod tests {
         // 500 ticks are left; entry and the wait's own way take 7 more.
         let (left, boundary) = (500, 5_007);
         let seen = [Seen { number: 0, left_ticks: left, landed: None }];
-        let mut hunt = Hunt::new(Stand::all(&calls, &seen, 2_500, 2_500));
-        hunt.usual = 7;
-        while let Some(delays) = hunt.delays(1, 1, &reached) {
-            hunt.take(&delays[0], &[landed(&calls[0], left, boundary, delays[0][0])], &mut reached);
+        let mut search = Search::new(Stand::all(&calls, &seen, 2_500, 2_500));
+        search.usual = 7;
+        while let Some(delays) = search.delays(1, 1, &reached) {
+            search.take(&delays[0], &[landed(&calls[0], left, boundary, delays[0][0])], &mut reached);
         }
-        reached.judge(&hunt.stands);
+        reached.judge(&search.stands);
         assert_eq!(reached.hit_in_any(), HashSet::from([10, 12, 14, 16, 18]));
         assert!(reached.table().contains("5 cannot be hit: before the samples"), "{}", reached.table());
         assert_eq!(reached.missing().count(), 0);
@@ -131,7 +131,7 @@ mod tests {
     fn what_could_be_hit_and_was_not_is_missing() {
         let (calls, mut reached) = ([call()], Reached::default());
         let seen = [Seen { number: 0, left_ticks: 100, landed: None }];
-        reached.judge(&Hunt::new(Stand::all(&calls, &seen, 2_500, 2_500)).stands);
+        reached.judge(&Search::new(Stand::all(&calls, &seen, 2_500, 2_500)).stands);
         assert_eq!(reached.missing().count(), 10);
         // Just behind a boundary nothing can be.
         let calls = [call(), call()];

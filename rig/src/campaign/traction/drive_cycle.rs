@@ -15,7 +15,7 @@ use tractive::protection::Trip;
 
 /// A drive written down as what happens when; times in s from the recording's beginning.
 #[derive(Clone, Debug, Default)]
-pub struct Ride {
+pub struct DriveCycle {
     /// Speeds in r/min, straight lines between.
     pub speed: Vec<(f64, f64)>,
     /// Torques in N·m, each from its time on, and whether the demand's rate is limited.
@@ -30,8 +30,8 @@ pub struct Ride {
     pub duration_s: f64,
 }
 
-/// The results of a ride.
-pub struct Ridden {
+/// The results of a cycle.
+pub struct CycleResult {
     /// The trace.
     pub rows: Vec<Row>,
     /// The effects of a fault.
@@ -40,13 +40,13 @@ pub struct Ridden {
     pub trip: Option<Trip>,
 }
 
-/// Step of a ride's trace, in s.
+/// Step of a cycle's trace, in s.
 const TRACE_STEP_S: f64 = 100e-6;
 
 impl Drive {
     /// Drives a script instead of a case.
-    pub fn ride(&self, ride: Ride, flaws: Flaws) -> Result<Ridden> {
-        let Ride { speed, torque, enable, line, injection, duration_s } = ride;
+    pub fn cycle(&self, cycle: DriveCycle, flaws: Flaws) -> Result<CycleResult> {
+        let DriveCycle { speed, torque, enable, line, injection, duration_s } = cycle;
         let operator = move |t_s: f64| {
             let (torque_nm, slew_limited) = held(&torque, t_s).unwrap_or((0.0, true));
             let demand = Demand { torque_nm: torque_nm as f32, slew_limited };
@@ -67,6 +67,6 @@ impl Drive {
             }
             tripped_s.is_none_or(|tripped_s| bench.time_s() < tripped_s + STAGES.aftermath_s)
         })?;
-        Ok(Ridden { rows: bench.rows().to_vec(), observed: bench.observed, trip: tasks.trip() })
+        Ok(CycleResult { rows: bench.rows().to_vec(), observed: bench.observed, trip: tasks.trip() })
     }
 }

@@ -111,13 +111,13 @@ pub struct Reached {
     hit: BTreeMap<String, HashSet<u32>>,
     /// The reason why no boundary can come at an instruction, in each control interrupt that executes it; `None` where in some one could.
     whys: BTreeMap<u32, Option<Why>>,
-    pub landings: usize,
+    pub preemption: usize,
     pub passes: usize,
 }
 
 impl Reached {
     pub fn add(&mut self, mode: &str, address: u32) {
-        self.landings += 1;
+        self.preemption += 1;
         self.hit.entry(mode.to_owned()).or_default().insert(address);
     }
 

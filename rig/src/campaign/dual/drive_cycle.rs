@@ -53,7 +53,7 @@ impl Script {
 
 /// A drive written down as what happens when.
 #[derive(Clone, Debug)]
-pub struct Ride {
+pub struct DriveCycle {
     /// The upper motor, the lower one.
     pub motors: [Script; 2],
     /// Source and schemes.
@@ -62,22 +62,28 @@ pub struct Ride {
     pub duration_s: f64,
 }
 
-/// The results of a ride.
-pub struct Ridden {
+/// The results of a cycle.
+pub struct CycleResult {
     /// The trace.
     pub rows: Vec<Row>,
     /// The observations of the fault.
     pub observed: Observed,
     /// The latched fault.
     pub trip: Option<Trip>,
-    /// The end of the ride, in s.
+    /// The end of the cycle, in s.
     pub ended_s: f64,
 }
 
 impl Drive {
     /// Drives a script instead of a case; the timers start at a tick.
-    pub fn ride(&self, ride: Ride, flaws: Flaws, trace_step_s: f64, origin: Tick) -> Result<Ridden> {
-        let Ride { motors, course, duration_s } = ride;
+    pub fn cycle(
+        &self,
+        cycle: DriveCycle,
+        flaws: Flaws,
+        trace_step_s: f64,
+        origin: Tick,
+    ) -> Result<CycleResult> {
+        let DriveCycle { motors, course, duration_s } = cycle;
         let later = |steps: &[(f64, f64)]| -> Vec<_> {
             steps.iter().map(|(t_s, rpm)| (t_s + LEAD_S, *rpm)).collect()
         };
@@ -99,6 +105,11 @@ impl Drive {
         let mut tasks = self.tasks(Instant(origin as u32));
         // Once it has stopped there is nothing to see.
         tasks.drive(&mut bench, |bench| bench.observed.safe.is_none())?;
-        Ok(Ridden { observed: bench.observed, trip: tasks.trip(), ended_s: bench.time_s(), rows: bench.rows })
+        Ok(CycleResult {
+            observed: bench.observed,
+            trip: tasks.trip(),
+            ended_s: bench.time_s(),
+            rows: bench.rows,
+        })
     }
 }

@@ -5,10 +5,10 @@
 //! later that the PWM interrupt lands on the one that is wanted; its instant stays what it was. The emulator's time is a count of
 //! instructions, so one landing in a control interrupt tells by which delay each other one is reached. Where it landed is the return
 //! address on its stack. Nothing may change: trace and edges of each pass are those of the undisturbed run, byte for byte. Every
-//! instruction has to be hit but those that no boundary can come at; [`reach`] says which, [`hunt`] chooses the delays.
+//! instruction has to be hit but those that no boundary can come at; [`reach`] says which, [`search`] chooses the delays.
 
-mod hunt;
 mod reach;
+mod search;
 
 use crate::build::System;
 use crate::elf::Image;
@@ -18,9 +18,9 @@ use crate::setup::Setup;
 use crate::timing::drive::Bench;
 use crate::timing::statistics::INTERRUPTS;
 use anyhow::{Context, Result};
-use hunt::Hunt;
 use rayon::prelude::*;
 use reach::{Reached, Stand};
+use search::Search;
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -114,8 +114,9 @@ impl Course {
                 Run { course: self, injector: &injector, image: &image, options, folder: &folder, is_last };
             findings.extend(run.check(&mut reached)?);
         }
-        let (image_name, Reached { landings, passes, .. }) = (self.system.image(), &reached);
-        let mut text = format!("{image_name}: {landings} landings in {passes} passes\n{}", reached.table());
+        let (image_name, Reached { preemption, passes, .. }) = (self.system.image(), &reached);
+        let mut text =
+            format!("{image_name}: {preemption} preemption in {passes} passes\n{}", reached.table());
         let missing = reached.findings(&image);
         if missing.len() > self.most_missing {
             findings.push(format!("{} were not hit, more than {}", missing.len(), self.most_missing));
@@ -147,13 +148,13 @@ impl Run<'_> {
             rayon::join(|| self.calls(&folder("logged")), || rayon::join(undisturbed, prompt));
         let (calls, (undisturbed, undisturbed_files), seen) = (calls?, undisturbed?, seen?.seen);
         let prompt = vec![0; calls.len()];
-        let mut hunt =
-            Hunt::new(Stand::all(&calls, &seen, self.course.control_ticks, self.course.deadline_ticks));
-        hunt.take(&prompt, &seen, &mut Reached::default());
+        let mut search =
+            Search::new(Stand::all(&calls, &seen, self.course.control_ticks, self.course.deadline_ticks));
+        search.take(&prompt, &seen, &mut Reached::default());
         let mut findings = Vec::new();
         for _ in 0..MOST_ROUNDS {
             let before = reached.hit_in_any().len();
-            let Some(delays) = hunt.delays(calls.len(), AT_ONCE, reached) else { break };
+            let Some(delays) = search.delays(calls.len(), AT_ONCE, reached) else { break };
             for (delays, (found, files)) in delays.iter().zip(self.passes(&delays)?) {
                 reached.passes += 1;
                 let pass = reached.passes;
@@ -164,14 +165,14 @@ impl Run<'_> {
                     findings
                         .push(format!("pass {pass}: trace or edges are not those of the undisturbed run"));
                 }
-                hunt.take(delays, &found.seen, reached);
+                search.take(delays, &found.seen, reached);
             }
             let new = reached.hit_in_any().len() - before;
             if !self.is_last && new < LEAST_NEW {
                 break;
             }
         }
-        reached.judge(&hunt.stands);
+        reached.judge(&search.stands);
         Ok(findings)
     }
 
