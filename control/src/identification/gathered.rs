@@ -3,7 +3,7 @@
 use super::observation::Observation;
 use crate::frames::AlphaBeta;
 
-/// What has acted since the last observation that was told.
+/// The sum of all that has acted since the last observation that was told.
 #[derive(Clone, Copy, Debug)]
 pub struct Gathered {
     volt_seconds: AlphaBeta,

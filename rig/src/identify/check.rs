@@ -4,20 +4,10 @@
 //! resistance and inverter take beside what the fit says of both. Sped up and braked by currents along q of either sign, ψ_q and D_q change their signs, ψ_d and D_d do not, so that
 //! resistance, dead time and thresholds drop out as they do from the mean of a motor's voltage and a brake's at one speed. Coasting, ψ_q and D_q are none.
 
-use super::fit::{Boundary, Fit, turned};
+use super::boundary::{Boundary, turned};
+use super::fit::{Fit, Turning};
 use nalgebra::{DMatrix, DVector};
 use tractive::identification::Stage;
-
-/// A flux linkage at a current, as the turning rotor shows it, and as the pulses do.
-#[derive(Clone, Copy, Debug)]
-pub struct Turning {
-    /// Current along d and q, in A.
-    pub current: (f64, f64),
-    /// Flux linkage of the turning rotor, in Wb.
-    pub found: (f64, f64),
-    /// That of the map of the pulses, in Wb.
-    pub map: (f64, f64),
-}
 
 /// Currents along q that belong to a part of the turn, as shares of the largest one: within this of it.
 const WITHIN: f64 = 0.25;

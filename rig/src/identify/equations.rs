@@ -1,7 +1,9 @@
 //! The linear equations of a fit, their solution by least squares, and how sure it is.
 
 use super::basis::Basis;
-use super::fit::{Boundary, Fit, turned};
+use super::boundary::{Boundary, turned};
+use super::fit::Fit;
+use super::spread::{BESIDE, Spread};
 use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector};
 use tractive::identification::Stage;
@@ -16,8 +18,6 @@ const UNSURE_EDGES_TURNING: f64 = 3.0;
 const LEAST_PART: usize = 4;
 /// Currents along d and q at which the map's bends are weighed.
 const GRID: (u32, u32) = (26, 18);
-/// Unknowns beside the co-energy's terms: resistance, dead time, threshold.
-pub const BESIDE: usize = 3;
 
 /// The boundaries that a solution is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -159,7 +159,7 @@ impl Equations {
         Ok(Solution { unknowns, left, spread: Spread { factor, lengths, sigma } })
     }
 
-    /// What the unknowns leave of a row.
+    /// The rest of a row that the unknowns leave.
     fn left(&self, row: usize, unknowns: &[f64]) -> f64 {
         let own = &self.rows[row * self.unknowns..(row + 1) * self.unknowns];
         self.right[row] - own.iter().zip(unknowns).map(|(a, b)| a * b).sum::<f64>()
@@ -170,30 +170,10 @@ impl Equations {
 pub struct Solution {
     /// The unknowns.
     pub unknowns: Vec<f64>,
-    /// What is left of each sample's row.
+    /// The rest of each sample's row.
     pub left: Vec<f64>,
-    /// How sure it is.
+    /// Its covariance.
     pub spread: Spread,
-}
-
-/// The covariance of a solution: the triangular factor of its equations, the lengths of their columns, and the standard deviation of a row.
-#[derive(Clone, Debug)]
-pub struct Spread {
-    factor: DMatrix<f64>,
-    lengths: Vec<f64>,
-    sigma: f64,
-}
-
-impl Spread {
-    /// Standard error of a sum of the unknowns with these shares, those beyond being 0, as far as what is left of the samples is noise: each
-    /// sample's own.
-    pub fn error(&self, shares: &[f64]) -> f64 {
-        let scaled = self.lengths.iter().enumerate();
-        let scaled =
-            scaled.map(|(k, length)| shares.get(k).map_or(0.0, |share| share / length)).collect::<Vec<_>>();
-        let solved = self.factor.tr_solve_upper_triangular(&DVector::from_vec(scaled));
-        solved.map_or(f64::NAN, |solved| self.sigma * solved.norm())
-    }
 }
 
 /// Residuals of both rows of each boundary, in the rotor's frame.

@@ -4,15 +4,18 @@
 //! what they observe. What is known beforehand is what a nameplate tells: the keys of `machine.toml` but for resistance and inertia.
 
 mod basis;
+mod boundary;
 mod check;
 mod commander;
 mod corrected;
 mod equations;
+mod experiment;
 mod fit;
 mod half;
 mod outcome;
 mod response;
 mod signs;
+mod spread;
 mod toml;
 mod turn;
 

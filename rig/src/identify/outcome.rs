@@ -1,8 +1,8 @@
 //! The outcome of an experiment, and how far it is from the truth.
 
-use super::check::Turning;
 use super::corrected::{offset_a, turned_by, without_offset};
-use super::fit::Fit;
+use super::experiment;
+use super::fit::{Fit, Turning};
 use super::signs::Signs;
 use super::turn::{Rotor, turned_deg};
 use crate::analysis::Figures;
@@ -113,7 +113,7 @@ impl Outcome {
         let half_s = 0.5 / parameters.max_switching_hz;
         let offset = offset_a(observations);
         let read = without_offset(observations, offset);
-        let fit = Fit::of(&read, bound_a, half_s)?;
+        let fit = experiment::fit(&read, bound_a, half_s)?;
         let observations = &turned_by(&read, fit.zero_rad);
         let still = |observation: &&Observation| !matches!(observation.stage, Stage::Turn | Stage::Done);
         let pulses_s = observations.iter().filter(still).map(|o| f64::from(o.length_s)).sum();
