@@ -37,7 +37,7 @@ pub struct Pulses {
 /// Change of current of a command, as a share of the bound: along d alone, along q, and along d beside q.
 const D_SHARE: f32 = 0.06;
 const Q_SHARE: f32 = 0.065;
-const SLOW_SHARE: f32 = 0.03;
+const SLOW_SHARE: f32 = 0.017;
 /// Share of the volt-seconds that d takes at most.
 const D_REACH: f32 = 0.7;
 /// Share of the way to where an axis without pulses is held that a command goes.
@@ -50,7 +50,7 @@ const OUTWARD: f32 = 1.4;
 const POSITIVE_SHARE: f32 = 0.2;
 /// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts: so many halves, for the
 /// pulse that is under way, and a time in s, by which the swing of any rotor is damped.
-const MOST_RAD: f32 = 0.018;
+const MOST_RAD: f32 = 0.028;
 const AHEAD_HALVES: f32 = 6.0;
 const AHEAD_S: f32 = 0.02;
 /// Mean current over the bound of pulses whose one side is given no more: triangles of one sign.
