@@ -52,7 +52,8 @@ fn the_reference_machine_with_noise_dead_time_and_a_wrong_resistance() {
     assert!(found.torque_worst < 0.01, "{}", found.torque_worst);
     assert!(found.magnet_error.abs() < 0.005, "{}", found.magnet_error);
     assert!(found.resistance_error.abs() < 0.01, "{}", found.resistance_error);
-    assert!((found.fit.dead_time_s - 5e-6).abs() < 0.2e-6, "{}", found.fit.dead_time_s);
+    // Dead time and threshold together: 5 µs of 1,500 V in each half, and no threshold.
+    assert!((found.lacking_v.0 / 6.75 - 1.0).abs() < 0.03, "{:?}", found.lacking_v);
     assert!((found.rotor.inertia_kg_m2 / 3.0 - 1.0).abs() < 0.01, "{}", found.rotor.inertia_kg_m2);
 }
 

@@ -115,6 +115,10 @@ impl MapError {
             return;
         }
         let seen = share_of(disturbance, omega, current, flux, resistance_from * largest_a);
+        // A machine without flux linkage, as one of reluctance alone without a current, has nothing to tell by.
+        if !seen.is_finite() {
+            return;
+        }
         self.share += BANDWIDTH_RAD_S * period_s * (seen + input.explained - self.explained - self.share);
         self.believe();
     }
@@ -166,6 +170,23 @@ mod tests {
                 assert!((told - share).abs() < 5e-3, "{told} for {share} with {more_ohm} Ω at {omega} rad/s");
             }
         }
+    }
+
+    #[test]
+    fn without_flux_linkage_nothing_is_told() {
+        let mut error = MapError::new();
+        error.step(&Input {
+            disturbance: Dq { d: 3.0, q: -2.0 },
+            explained: 0.0,
+            current: Dq { d: 0.0, q: 0.0 },
+            flux: Dq { d: 0.0, q: 0.0 },
+            omega: 300.0,
+            period_s: 1e-3,
+            resistance_from: 0.15,
+            largest_a: 267.0,
+            fastest: 1_500.0,
+        });
+        assert_eq!((error.share(), error.link_scale(), error.scales()), (0.0, 1.0, Scales::NONE));
     }
 
     /// A drive that makes use of the link's scale, in front of a machine with this share of more flux linkage: the estimate after two seconds,

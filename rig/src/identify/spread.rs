@@ -1,0 +1,26 @@
+//! The covariance of a fit's unknowns.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Unknowns beside the co-energy's terms: resistance, dead time, threshold.
+pub const BESIDE: usize = 3;
+
+/// The covariance of a solution: the triangular factor of its equations, the lengths of their columns, and the standard deviation of a row.
+#[derive(Clone, Debug)]
+pub struct Spread {
+    pub(super) factor: DMatrix<f64>,
+    pub(super) lengths: Vec<f64>,
+    pub(super) sigma: f64,
+}
+
+impl Spread {
+    /// Standard error of a sum of the unknowns with these shares, those beyond being 0, as far as what is left of the samples is noise: each
+    /// sample's own.
+    pub fn error(&self, shares: &[f64]) -> f64 {
+        let scaled = self.lengths.iter().enumerate();
+        let scaled =
+            scaled.map(|(k, length)| shares.get(k).map_or(0.0, |share| share / length)).collect::<Vec<_>>();
+        let solved = self.factor.tr_solve_upper_triangular(&DVector::from_vec(scaled));
+        solved.map_or(f64::NAN, |solved| self.sigma * solved.norm())
+    }
+}
