@@ -53,6 +53,7 @@ fn recording(world: &mut World) -> Happened {
                 recorded: Vec::new(),
                 observations: Vec::new(),
                 found: None,
+                beside: Vec::new(),
             })
         }
         Side::Zs9(side) => {
