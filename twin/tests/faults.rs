@@ -16,13 +16,13 @@ fn image(system: System) -> PathBuf {
 /// Instants in the start, in µs: memory cleared, crystal, PLL, pins, timers, converters, zeros, gates' pins, breaks, watchdog, run; of either image,
 /// the ZS9's [later](later_us). The first one is that of the other faults.
 const STARTING_US: [u32; 14] =
-    [5_314, 1_000, 3_000, 4_400, 4_597, 4_602, 5_121, 5_136, 10_159, 10_514, 13_474, 14_214, 14_444, 17_714];
+    [5_314, 1_000, 3_000, 4_400, 4_608, 4_613, 5_132, 5_136, 10_159, 10_514, 13_474, 14_214, 14_444, 17_714];
 /// The first instant at which peripherals have their clocks, in µs, likewise.
-const CLOCKED_US: u32 = 4_596;
+const CLOCKED_US: u32 = 4_607;
 
 /// The time that the ZS9 needs to copy its interrupts' code before anything else, in µs.
 fn later_us(system: System) -> u32 {
-    if system == System::Zs9 { 3_426 } else { 0 }
+    if system == System::Zs9 { 4_259 } else { 0 }
 }
 
 /// The time within which every gate is off; `None` where the drive goes on.

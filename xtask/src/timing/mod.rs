@@ -7,7 +7,7 @@
 //!
 //! [`system`] says what is driven, [`drive`] runs the rig, [`log`] reads a line, [`meter`] assigns instructions to interrupts,
 //! [`cost`](crate::thumb::cost) prices them, [`statistics`] and [`tally`] sum them up, [`parts`] and [`profile`] say whose they are, [`blocks`] counts
-//! building blocks by themselves, [`entry`] what could delay an entry, [`budget`] judges, [`report`], [`tables`] and [`page`] tell, [`kept`] compares with what the repository holds.
+//! building blocks by themselves, [`entry`] what could delay an entry, [`budget`] judges, [`report`], [`tables`] and [`page`] tell, [`golden`] compares with what the repository holds.
 
 mod blocks;
 mod budget;
