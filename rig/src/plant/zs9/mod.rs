@@ -5,7 +5,7 @@
 //!                                            upper motor  lower motor
 //! ```
 //!
-//! Ideal switches, unless they have [`drops`]. Dead time is the affair of the gates, not of the plant: while a leg waits, its diodes make one of the states that
+//! Ideal switches, unless they have drops. Dead time is the affair of the gates, not of the plant: while a leg waits, its diodes make one of the states that
 //! are known here. Between two edges of the gates network and motors are integrated together, as one set of equations. Outside shoot-through the bridge draws
 //! `i_in = 1.5 Σ (s·i)` at `U_in = v1 + v2 − U_dc`, s being the terminals' shares of the link as a vector, and a motor sees
 //! `u = U_in s`; so what leaves the network enters the motors, also while the diodes of a bridge without gates decide on s.
