@@ -341,12 +341,12 @@ mod tests {
             let rate = (hz * 4_294_967_296.0 / 25e6) as f32;
             let mut now = Instant(0);
             for (index, mode) in [
-                (0.92, Mode::Opt7c),
-                (0.96, Mode::Opt7d),
-                (0.97, Mode::Opt7e),
-                (0.96, Mode::Opt7d),
-                (0.92, Mode::Opt7c),
-                (0.8, Mode::Opt7b),
+                (0.92, Mode::Opp7c),
+                (0.96, Mode::Opp7d),
+                (0.97, Mode::Opp7e),
+                (0.96, Mode::Opp7d),
+                (0.92, Mode::Opp7c),
+                (0.8, Mode::Opp7b),
             ] {
                 for _ in 0..2_000 {
                     let angle = Angle((f64::from(rate) * f64::from(now.0)) as u64 as u32);

@@ -19,7 +19,10 @@ const FLAWS: [(&str, &str); 19] = [
     ("noise of the currents", "--noise-a 0.4667"),
     ("offset of a current sensor", "--current-offset 2,0,0"),
     ("gains of current sensors", "--current-gains 1,-1,0"),
-    ("time constant of the current sensors", "--current-filter-us 10"),
+    (
+        "time constant of the current sensors, which the drive knows",
+        "--current-filter-us 10 --current-filter-known",
+    ),
     ("phases sampled one after the other", "--adc-skew-us 2,1,0"),
     ("link read too large", "--udc-gain 1"),
     ("ripple of the link", "--udc-ripple 30@300"),

@@ -433,8 +433,15 @@ fn filled(options: &Options, machine: &Machine) -> Options {
     let beside = Beside { udc_gain, current_filter_us, angle_deg: [angle_1f_deg, angle_2f_deg] };
     let Filled { run, beside, flaws } = Filled::of(&options.run, beside, &own.flaws, machine);
     let Beside { udc_gain, current_filter_us, angle_deg: [angle_1f_deg, angle_2f_deg] } = beside;
-    let own =
-        TractionOptions { udc_gain, current_filter_us, angle_1f_deg, angle_2f_deg, flaws, ..own.clone() };
+    let own = TractionOptions {
+        udc_gain,
+        current_filter_us,
+        current_filter_known: true,
+        angle_1f_deg,
+        angle_2f_deg,
+        flaws,
+        ..own.clone()
+    };
     Options { run, own }
 }
 
