@@ -74,7 +74,7 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     keep_left_out(places, tree, &left_out)?;
     let programs = built?;
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;
-    let trials = learnt(places, &programs, options.longest)?;
+    let trials = learnt(places, &programs, options)?;
     let results = Results::open(&places.work.join("results.jsonl"))?;
     let mut open: Vec<&Mutant> = chosen(&tree.mutants, options)
         .into_iter()
@@ -99,7 +99,8 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
 }
 
 /// The trials of all programs; those of a program that is as it was are read.
-fn learnt(places: &Places, programs: &[Program], longest_s: u64) -> Result<Vec<Trial>> {
+fn learnt(places: &Places, programs: &[Program], options: &Options) -> Result<Vec<Trial>> {
+    let longest_s = options.longest;
     let folder = places.work.join("reached");
     std::fs::create_dir_all(&folder)?;
     let mut all = Vec::new();
@@ -117,8 +118,8 @@ fn learnt(places: &Places, programs: &[Program], longest_s: u64) -> Result<Vec<T
         }
         let found = match (program.is_test, program.name.ends_with(" tractive-rig")) {
             (true, _) => trials::of(program)?,
-            (false, true) => trials::goldens(program),
-            (false, false) => Vec::new(),
+            (false, true) if options.bytes => trials::goldens(program),
+            (false, _) => continue,
         };
         let count = found.len();
         let learnt: Vec<Trial> = found

@@ -33,7 +33,7 @@ pub enum End {
 
 /// A mutant's run may take so many times as long, and `GRACE_S` more.
 const TIMES: f64 = 4.0;
-const GRACE_S: f64 = 2.0;
+const GRACE_S: f64 = 0.9;
 /// Time by the wall clock after which a run is ended, whatever it waits for.
 const WALL: Duration = Duration::from_secs(300);
 
