@@ -34,7 +34,8 @@ const TOGETHER: [&[&str]; 4] = [
 
 /// The unit tests of the optimised patterns, which no other command builds in: the rig has them in its dependencies alone.
 const CONTROL: &str = "tractive-control";
-const CONTROL_PARTS: [&[&str]; 1] = [&["--lib", "--features", "optimal", "modulation"]];
+const CONTROL_PARTS: [&[&str]; 2] =
+    [&["--lib", "--features", "optimal", "modulation"], &["--test", "pulses", "--features", "optimal"]];
 
 /// The rig, and the parts that it is tested in. Its own unit tests take a second, but all of it compiled once more: that is done without
 /// optimisation. The others take the library that `cargo rig` runs.
