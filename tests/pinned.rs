@@ -14,7 +14,7 @@ use tractive::control::{
 };
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
-use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
+use tractive::modulation::{CarrierHalf, Ladder, Mode, Schedule, SwitchLimits};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
@@ -270,12 +270,13 @@ impl PwmPort for Board {
     fn enter(&mut self, _safe: SafeState, _now: Instant) {}
 }
 
-/// Up to full speed and back, torque wandering: every mode comes by.
-fn sweep(number: u32, dead_ticks: u32, out: &mut String) {
+/// Up to full speed and back, torque wandering: every mode of the ladder comes by.
+fn sweep(number: u32, dead_ticks: u32, ladder: Ladder, out: &mut String) {
     let settings = Settings::new(CLOCK, SwitchLimits::new(250, dead_ticks, 900.0, &CLOCK));
     let first = SwitchLimits::new(250, dead_ticks, 900.0, &CLOCK).shortest_half_ticks;
     let shared = Shared::new();
-    let mut control = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
+    let mut control = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks))
+        .scheduled(Schedule::on(ladder, &CLOCK));
     let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(first));
     let (walk, shadow) = (Walk::new(100 + number), CarrierHalf::off(first));
     let mut board = Board { walk, now: 0, shadow, report: Report::default() };
@@ -313,10 +314,24 @@ fn sweep(number: u32, dead_ticks: u32, out: &mut String) {
 fn every_pulse_and_every_report_of_a_sweep_is_as_it_was() {
     let mut out = String::new();
     for (number, dead_ticks) in [(0, 0), (1, 100)] {
-        sweep(number, dead_ticks, &mut out);
+        sweep(number, dead_ticks, Ladder::PAPER, &mut out);
     }
     for mode in ["Async", "Sync", "Square"] {
         assert!(out.contains(mode), "{mode}: {out}");
     }
     holds("sweep", &out);
+}
+
+/// With `--features optimal`.
+#[cfg(feature = "optimal")]
+#[test]
+fn every_pulse_and_every_report_of_a_sweep_of_optimised_patterns_is_as_it_was() {
+    let mut out = String::new();
+    for (number, dead_ticks) in [(0, 0), (1, 100)] {
+        sweep(number, dead_ticks, Ladder::OPTIMAL, &mut out);
+    }
+    for mode in ["Async", "Opt15", "Opt7", "Opt3", "Square"] {
+        assert!(out.contains(mode), "{mode}: {out}");
+    }
+    holds("optimal", &out);
 }

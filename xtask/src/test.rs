@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
 /// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the
 /// first.
-const TOGETHER: [&[&str]; 4] = [
+const TOGETHER: [&[&str]; 5] = [
     &[
         "tractive",
         "tractive-control",
@@ -28,14 +28,17 @@ const TOGETHER: [&[&str]; 4] = [
         "tractive-mutants",
     ],
     &[CONTROL],
+    &[DRIVE],
     &[RIG],
     &[OWN],
 ];
 
-/// The unit tests of the optimised patterns, which no other command builds in: the rig has them in its dependencies alone.
+/// The tests of the optimised patterns, which no other command builds in: the rig has them in its dependencies alone.
 const CONTROL: &str = "tractive-control";
 const CONTROL_PARTS: [&[&str]; 2] =
     [&["--lib", "--features", "optimal", "modulation"], &["--test", "pulses", "--features", "optimal"]];
+const DRIVE: &str = "tractive";
+const DRIVE_PARTS: [&[&str]; 1] = [&["--test", "pinned", "--features", "optimal"]];
 
 /// The rig, and the parts that it is tested in. Its own unit tests take a second, but all of it compiled once more: that is done without
 /// optimisation. The others take the library that `cargo rig` runs.
@@ -166,6 +169,7 @@ fn host(packages: &[String]) -> Result<bool> {
     let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
     let parts: &[&[&str]] = match packages {
         [package] if package == CONTROL => &CONTROL_PARTS,
+        [package] if package == DRIVE => &DRIVE_PARTS,
         [package] if package == RIG => &RIG_PARTS,
         [package] if package == OWN => &OWN_PARTS,
         _ => &[&[]],
