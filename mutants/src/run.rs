@@ -98,6 +98,9 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     })
 }
 
+/// Limits up to which it is looked for what was learnt, in s.
+const LONGEST_KEPT_S: u64 = 30;
+
 /// The trials of all programs; those of a program that is as it was are read.
 fn learnt(places: &Places, programs: &[Program], options: &Options) -> Result<Vec<Trial>> {
     let longest_s = options.longest;
@@ -106,14 +109,18 @@ fn learnt(places: &Places, programs: &[Program], options: &Options) -> Result<Ve
     let mut all = Vec::new();
     for program in programs {
         let bytes = std::fs::read(&program.path).with_context(|| program.path.display().to_string())?;
-        let mut hasher = DefaultHasher::new();
-        (bytes, longest_s, include_str!("../goldens.txt")).hash(&mut hasher);
-        let file = folder.join(format!("{}-{:016x}.json", program.name.replace(' ', "-"), hasher.finish()));
-        if let Some(trials) =
-            std::fs::read_to_string(&file).ok().and_then(|text| serde_json::from_str(&text).ok())
-        {
-            let trials: Vec<Trial> = trials;
-            all.extend(trials);
+        let mut of_bytes = DefaultHasher::new();
+        bytes.hash(&mut of_bytes);
+        let file = |longest_s: u64| {
+            let mut hasher = of_bytes.clone();
+            (longest_s, include_str!("../goldens.txt")).hash(&mut hasher);
+            folder.join(format!("{}-{:016x}.json", program.name.replace(' ', "-"), hasher.finish()))
+        };
+        // What was learnt of longer ones, too, serves as well.
+        let read = |longest_s| std::fs::read_to_string(file(longest_s)).ok();
+        let known = (longest_s..=LONGEST_KEPT_S).find_map(read);
+        if let Some(trials) = known.and_then(|text| serde_json::from_str::<Vec<Trial>>(&text).ok()) {
+            all.extend(trials.into_iter().filter(|trial| trial.seconds <= longest_s as f64));
             continue;
         }
         let found = match (program.is_test, program.name.ends_with(" tractive-rig")) {
@@ -128,7 +135,7 @@ fn learnt(places: &Places, programs: &[Program], options: &Options) -> Result<Ve
             .filter_map(|trial| trial.learn(&places.work.join("scratch"), longest_s))
             .collect();
         eprintln!("mutants: {}: {} of {count} tests come by a mutant", program.name, learnt.len());
-        std::fs::write(&file, serde_json::to_string(&learnt)?)?;
+        std::fs::write(file(longest_s), serde_json::to_string(&learnt)?)?;
         all.extend(learnt);
     }
     Ok(all)

@@ -34,8 +34,8 @@ pub enum End {
 /// A mutant's run may take so many times as long, and `GRACE_S` more.
 const TIMES: f64 = 4.0;
 const GRACE_S: f64 = 0.9;
-/// A watched run takes several times as long as another; one of so many s is told for by a run that is not.
-const WATCHED_TIMES: u64 = 5;
+/// A watched run takes longer than another; one of so many s is told for by a run that is not.
+const WATCHED_TIMES: u64 = 2;
 const SHORT_S: f64 = 0.3;
 /// Time by the wall clock after which a run is ended, whatever it waits for.
 const WALL: Duration = Duration::from_secs(300);
