@@ -14,6 +14,7 @@ use tractive::control::{
 };
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
+use tractive::machine::{Ratings, Tables};
 use tractive::modulation::{CarrierHalf, Ladder, Mode, Schedule, SwitchLimits};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
@@ -21,8 +22,9 @@ use tractive::time::{Clock, Instant};
 
 /// Control periods of a walk.
 const PERIODS: u32 = 4_000;
-/// Walks of each law; every other one has a damped link.
-const WALKS: u32 = 8;
+/// Walks of each law; every other one has a damped link, and the last two a machine whose magnets are kept.
+const WALKS: u32 = 10;
+const KEPT: Tables = Tables { ratings: Ratings { min_id_a: -120.0, ..BUILT_IN.ratings }, ..BUILT_IN };
 
 /// Random numbers, the same on every machine.
 struct Random(u64);
@@ -140,15 +142,16 @@ fn pin(sum: u64, numbers: &[f32]) -> u64 {
 fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
     let (clock, mut walk, mut sum) = (Clock::new(25_000_000, 2_500), Walk::new(number), BASIS);
     let gains = Gains::of(number & 2 != 0, number & 1 != 0);
-    let law_of = Law { gains: &gains, clock: &clock, tables: &BUILT_IN };
+    let tables = if number < WALKS - 2 { &BUILT_IN } else { &KEPT };
+    let law_of = Law { gains: &gains, clock: &clock, tables };
     let mut damper = LinkDamper::at(1_500.0);
     for period in 0..PERIODS {
         walk.step(&clock);
         let omega = law.track(walk.angle, &clock);
         let off = Dq { d: 15.0 * walk.random.next(), q: 15.0 * walk.random.next() };
         let current = law.target().current + off;
-        let sample = RotorSample::new(current.unpark(walk.angle.sin_cos()).abc(), walk.angle, &BUILT_IN);
-        law.observe(&sample, &BUILT_IN);
+        let sample = RotorSample::new(current.unpark(walk.angle.sin_cos()).abc(), walk.angle, tables);
+        law.observe(&sample, tables);
         if period % 64 == 0 {
             law.warm(walk.warmth, &law_of);
         }
@@ -161,7 +164,7 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
         }
         if walk.random.is(0.001) {
             law.idle();
-            law.observe(&sample, &BUILT_IN);
+            law.observe(&sample, tables);
         }
         if walk.random.is(0.001) {
             law.begin_without_torque();
