@@ -397,6 +397,7 @@ mod tests {
     }
 
     /// A value that reads its own cell while it is written.
+    #[derive(Clone, Copy)]
     struct Looking(u32);
 
     static LOOKED_AT: Seqlock<Looking, 1> = Seqlock::new();
