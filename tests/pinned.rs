@@ -3,6 +3,8 @@
 
 #[path = "pinned/file.rs"]
 mod file;
+#[path = "pinned/options.rs"]
+mod options;
 
 use file::{BASIS, hash, holds};
 use std::fmt::Write;
