@@ -2,11 +2,12 @@
 
 use nucleo_g474re::built_in::traction;
 use nucleo_g474re::can::BitTiming;
+use nucleo_g474re::patterns;
 use nucleo_g474re::power_stage::{POWER_STAGE, PowerStage};
 use nucleo_g474re::zs9::feedback::{decoded, encoded};
 use nucleo_g474re::zs9::period::{LegCompares, PeriodCompares};
 use nucleo_g474re::zs9::{HALF_CYCLES, settings};
-use tractive::drive::traction::Settings;
+use tractive::drive::traction::{Drops, Settings};
 use tractive::nine_switch::GateTicks;
 use tractive::ports::{GateFeedback, PlayedPeriod};
 
@@ -131,8 +132,12 @@ fn what_the_timers_cannot_play_has_no_compares() {
 #[test]
 fn settings_of_a_stage_have_its_times() {
     let ratings = &traction::BUILT_IN.ratings;
-    let stage = PowerStage { angle_late_s: 30e-6, current_filter_s: 4e-6, ..POWER_STAGE };
+    let drops = Drops { threshold_v: 1.1, slope_ohm: 3e-3 };
+    let stage = PowerStage { angle_late_s: 30e-6, current_filter_s: 4e-6, drops, ..POWER_STAGE };
     let got = stage.settings(ratings);
+    assert_eq!((got.drops.threshold_v, got.drops.slope_ohm), (1.1, 3e-3));
+    let half_s = 0.5 / (patterns::FREE_CARRIER_SHARE * ratings.max_switching_hz);
+    assert_eq!(got.devices.shortest_half_ticks, (half_s * got.clock.ticks_per_s) as u32 + 1);
     assert_eq!(got.angle_late_s, 30e-6);
     assert_eq!(got.current_filter_ticks, (4e-6 * got.clock.ticks_per_s).round() as u32);
     assert!(got.current_filter_ticks > 10);
