@@ -318,7 +318,7 @@ mod tests {
     use super::*;
     use crate::built_in::traction::BUILT_IN;
 
-    /// What is known of warmth and limits stays; what was on its way does not.
+    /// Warmth and limits stay; torque on its way does not.
     #[test]
     fn a_demand_that_is_dropped_keeps_its_derating() {
         let settings = Settings::rated(&BUILT_IN.ratings, 1e-3, None);

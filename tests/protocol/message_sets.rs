@@ -1,4 +1,4 @@
-//! What a message set keeps of what was sent, and the request that it makes of it: every level by itself, armed and not.
+//! Message sets: the request that they make of what was sent, every level by itself, armed and not.
 
 use tractive::built_in::traction::BUILT_IN;
 use tractive::built_in::zs9;
