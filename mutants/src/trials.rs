@@ -34,8 +34,7 @@ pub enum End {
 /// A mutant's run may take so many times as long, and `GRACE_S` more.
 const TIMES: f64 = 4.0;
 const GRACE_S: f64 = 0.9;
-/// A watched run takes longer than another; one of so many s is told for by a run that is not.
-const WATCHED_TIMES: u64 = 2;
+/// A watched run takes longer than another: from so many s on a test's time is that of a run that is not watched.
 const SHORT_S: f64 = 0.3;
 /// Time by the wall clock after which a run is ended, whatever it waits for.
 const WALL: Duration = Duration::from_secs(300);
@@ -70,7 +69,7 @@ impl Trial {
         let (out, time, reached) = (folder.join("out"), folder.join("time"), folder.join("reached"));
         std::fs::create_dir_all(&reached).ok()?;
         let mut watched = self.command(&out);
-        watched.env("MUTANT_SECONDS", (WATCHED_TIMES * longest_s).to_string()).env("MUTANT_TIME", &time);
+        watched.env("MUTANT_SECONDS", longest_s.to_string()).env("MUTANT_TIME", &time);
         let mut status = ended(watched.env("MUTANT_REACHED", &reached))?;
         self.seconds = processor_s(&time).max(0.003);
         self.reached = union(&reached);
