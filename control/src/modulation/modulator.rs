@@ -30,6 +30,8 @@ pub struct Modulator {
     waited: u32,
     /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
     zero_rad: f32,
+    /// The link that these are for, in V.
+    udc_v: f32,
 }
 
 /// Share of a half that is zero voltage, over half the zero voltage of a sector of 60° as an angle in rad.
@@ -78,6 +80,7 @@ impl Modulator {
             #[cfg(feature = "optimal")]
             waited: 0,
             zero_rad: 0.0,
+            udc_v: 0.0,
         }
     }
 
@@ -204,7 +207,7 @@ impl Modulator {
         self.plan = None;
         self.after_pattern = from.is_pattern() && mode.is_carrier();
         self.transition =
-            if from.is_pattern() { PatternTransition::begun(self.zero_rad) } else { PatternTransition::DONE };
+            if from.is_pattern() { PatternTransition::begun(self.zero_rad, self.udc_v) } else { PatternTransition::DONE };
         self.schedule.switched(start);
     }
 
@@ -273,8 +276,8 @@ impl Modulator {
             return self.optimal(branch, start, period_ticks, seen);
         }
         let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
-        self.zero_rad = own_rad;
-        let (period, notch) = match self.transition.sector(own_rad, self.mode.sector_halves()) {
+        (self.zero_rad, self.udc_v) = (own_rad, seen.udc_v);
+        let (period, notch) = match self.transition.sector(own_rad, self.mode.sector_halves(), seen.udc_v) {
             Some(sector) => {
                 // The edge has the length that it should have, and whatever time is left is zero voltage.
                 let zero = nominal * (sector.zero_rad * ZERO_OF_HALF);

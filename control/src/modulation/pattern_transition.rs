@@ -25,6 +25,8 @@ pub const TRANSITION_SECTORS: u32 = SECTORS.len() as u32;
 pub struct PatternTransition {
     /// Half the zero voltage of a sector of the old pattern, as an angle in rad.
     old_zero_rad: f32,
+    /// The link that it had, in V.
+    old_udc_v: f32,
     /// `true` while the present carrier has a notch.
     notched: bool,
     /// Halves since the switch.
@@ -41,18 +43,21 @@ pub struct Sector {
 
 impl PatternTransition {
     /// A pattern of its own size.
-    pub const DONE: Self = Self { old_zero_rad: 0.0, notched: false, halves: u32::MAX };
+    pub const DONE: Self = Self { old_zero_rad: 0.0, old_udc_v: 0.0, notched: false, halves: u32::MAX };
 
-    /// Out of a pattern with half a sector's zero voltage of `old_zero_rad`.
-    pub const fn begun(old_zero_rad: f32) -> Self {
-        Self { old_zero_rad, notched: false, halves: 0 }
+    /// Out of a pattern with half a sector's zero voltage of `old_zero_rad`, on a link of `old_udc_v`.
+    pub const fn begun(old_zero_rad: f32, old_udc_v: f32) -> Self {
+        Self { old_zero_rad, old_udc_v, notched: false, halves: 0 }
     }
 
-    /// The present sector on the way to `new_zero_rad`, with so many halves a sector; `None` once the pattern has grown.
-    pub fn sector(&self, new_zero_rad: f32, sector_halves: u32) -> Option<Sector> {
+    /// The present sector on the way to `new_zero_rad`, with so many halves a sector, on a link of `udc_v`; `None` once the pattern has grown.
+    pub fn sector(&self, new_zero_rad: f32, sector_halves: u32, udc_v: f32) -> Option<Sector> {
         let (share, lead) = SECTORS.get(self.halves.checked_div(sector_halves)? as usize)?;
-        let change_rad = new_zero_rad - self.old_zero_rad;
-        Some(Sector { zero_rad: self.old_zero_rad + share * change_rad, lead_rad: lead * change_rad })
+        // An edge of the old length, in flux, on this link.
+        let edge_rad = core::f32::consts::FRAC_PI_6 - self.old_zero_rad;
+        let old_zero_rad = self.old_zero_rad + edge_rad * (1.0 - self.old_udc_v / udc_v);
+        let change_rad = new_zero_rad - old_zero_rad;
+        Some(Sector { zero_rad: old_zero_rad + share * change_rad, lead_rad: lead * change_rad })
     }
 
     /// One half more is made, which has `left_ticks` beside its edge where others like it have `zero_ticks`. Returns for how many of them its
