@@ -56,6 +56,7 @@ impl PatternTransition {
         // An edge of the old length, in flux, on this link.
         let edge_rad = core::f32::consts::FRAC_PI_6 - self.old_zero_rad;
         let old_zero_rad = self.old_zero_rad + edge_rad * (1.0 - self.old_udc_v / udc_v);
+        let old_zero_rad = if old_zero_rad > 0.0 { old_zero_rad } else { 0.0 };
         let change_rad = new_zero_rad - old_zero_rad;
         Some(Sector { zero_rad: old_zero_rad + share * change_rad, lead_rad: lead * change_rad })
     }

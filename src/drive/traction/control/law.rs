@@ -143,6 +143,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             demand: &demand,
             window,
             udc_v,
+            change_v: self.ahead.next_v,
             link_scale: self.link_scale,
             swing,
             limits: &self.limits,
