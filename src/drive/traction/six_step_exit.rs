@@ -3,7 +3,9 @@
 use super::slot::Decision;
 use crate::frames::six_step_v;
 use crate::machine::Ratings;
-use crate::modulation::{Mode, TRANSITION_SECTORS};
+use crate::modulation::Mode;
+
+const TRANSITION_SECTORS: u32 = 1;
 use crate::time::Instant;
 
 /// Rate at which the voltage falls from square wave to the one that the torque needs, in shares of six-step per second.
