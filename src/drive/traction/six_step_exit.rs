@@ -5,7 +5,7 @@ use crate::frames::six_step_v;
 use crate::machine::Ratings;
 use crate::modulation::Mode;
 
-const TRANSITION_SECTORS: u32 = 1;
+const TRANSITION_SECTORS: u32 = 4;
 use crate::time::Instant;
 
 /// Rate at which the voltage falls from square wave to the one that the torque needs, in shares of six-step per second.
