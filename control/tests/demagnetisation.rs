@@ -136,7 +136,15 @@ fn least_of_references<L: ControlLaw>(
         }
         let demand = Demand { torque_nm: wanted_nm, slew_limited: period < 6_000 };
         law.aim(
-            &AimInput { demand: &demand, window: None, udc_v, change_v: 0.0, link_scale: 1.0, swing: None, limits },
+            &AimInput {
+                demand: &demand,
+                window: None,
+                udc_v,
+                change_v: 0.0,
+                link_scale: 1.0,
+                swing: None,
+                limits,
+            },
             &constants,
         );
         let target = law.target();

@@ -72,3 +72,75 @@ impl LinkRipple {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_S: f32 = 1e-4;
+
+    fn link_v(amplitude_v: f32, hz: f32, time_s: f32) -> f32 {
+        let turns = hz * time_s;
+        1_500.0 + amplitude_v * Angle::from_turns(turns - (turns as i32) as f32).sin_cos().sin
+    }
+
+    /// Of half a second, with a sample every one or two periods, the last tenth: the largest error of the change over 1.25 ms, and the largest such
+    /// change, in V.
+    fn errors_v(amplitude_v: f32, hz: f32) -> (f32, f32) {
+        let mut ripple = LinkRipple::at(1_500.0);
+        let (mut time_s, mut error_v, mut change_v) = (0.0_f32, 0.0_f32, 0.0_f32);
+        for sample in 0..3_300 {
+            let passed_s = if sample % 2 == 0 { PERIOD_S } else { 2.0 * PERIOD_S };
+            time_s += passed_s;
+            ripple.step(link_v(amplitude_v, hz, time_s), passed_s);
+            if time_s > 0.4 {
+                let [expected_v] = ripple.change(0.0, [1.25e-3]);
+                let true_v = link_v(amplitude_v, hz, time_s + 1.25e-3) - link_v(amplitude_v, hz, time_s);
+                error_v = f32::max(error_v, (expected_v - true_v).abs());
+                change_v = f32::max(change_v, true_v.abs());
+            }
+        }
+        (error_v, change_v)
+    }
+
+    #[test]
+    fn ripple_of_any_line_is_expected() {
+        for (amplitude_v, hz) in [(100.0, 33.0), (100.0, 50.0), (100.0, 100.0), (30.0, 300.0), (30.0, 600.0)]
+        {
+            let (error_v, change_v) = errors_v(amplitude_v, hz);
+            assert!(error_v < 0.03 * amplitude_v, "{hz} Hz: {error_v} V of {change_v} V");
+            assert!(change_v > 0.2 * amplitude_v, "{hz} Hz: {change_v} V");
+        }
+    }
+
+    #[test]
+    fn a_link_that_stands_still_is_expected_to_stay_to_the_bit() {
+        let mut ripple = LinkRipple::at(0.0);
+        for _ in 0..10_000 {
+            ripple.step(1_512.3, PERIOD_S);
+            assert_eq!(ripple.change(PERIOD_S, [0.6e-3, 1.25e-3]), [0.0, 0.0]);
+        }
+    }
+
+    #[test]
+    fn a_step_is_taken_for_little_ripple_and_not_for_long() {
+        let mut ripple = LinkRipple::at(1_500.0);
+        let mut largest_v = [0.0_f32; 2];
+        for sample in 0..2_000 {
+            ripple.step(1_650.0, PERIOD_S);
+            let [expected_v] = ripple.change(0.0, [1.25e-3]);
+            let later = &mut largest_v[usize::from(sample > 1_000)];
+            *later = f32::max(*later, expected_v.abs());
+        }
+        assert!(largest_v[0] < 20.0 && largest_v[1] < 1.5, "{largest_v:?} V of 150 V");
+    }
+
+    #[test]
+    fn what_is_no_number_does_not_stay() {
+        let mut ripple = LinkRipple::at(1_500.0);
+        for udc_v in [f32::NAN, f32::INFINITY, 0.0, 1_500.0] {
+            ripple.step(udc_v, PERIOD_S);
+        }
+        assert_eq!(ripple.change(0.0, [1e-3]), [0.0]);
+    }
+}

@@ -169,7 +169,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             Steady { omega, udc_v, voltage_v: self.steady_v, modulation_index: self.modulation_index };
         let (mode, revises) = (slot.key.mode, self.revises);
         let committed_v = (sample.udc_v + committed_v) * self.link_scale;
-        let wanted = Wanted { mode, revises, between: slot.between, before: &self.reference, udc_v: committed_v };
+        let wanted =
+            Wanted { mode, revises, between: slot.between, before: &self.reference, udc_v: committed_v };
         let committed = committed(&self.pulses, now, &steady, &self.settings, &wanted);
         let law = Law { gains, clock, tables: self.machine.tables() };
         let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
