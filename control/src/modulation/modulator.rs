@@ -23,6 +23,8 @@ pub struct Modulator {
     plan: Option<Plan>,
     /// By how many ticks the half before ended behind its boundary, where a pattern gives way to another there; 0 otherwise.
     late_ticks: f32,
+    /// Fundamental of the pattern's half before, in V.
+    voltage_v: f32,
     /// `true` if the half before was a pattern's and the next one is a carrier's.
     after_pattern: bool,
     /// Carriers for which an optimised pattern has waited to take over from a free one.
@@ -72,6 +74,7 @@ impl Modulator {
             mirrored: false,
             plan: None,
             late_ticks: 0.0,
+            voltage_v: 0.0,
             after_pattern: false,
             #[cfg(feature = "optimal")]
             waited: 0,
@@ -268,15 +271,23 @@ impl Modulator {
             return self.optimal(branch, start, period_ticks, seen);
         }
         let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
-        let due = wanted + core::mem::take(&mut self.late_ticks);
-        let notched = !self.mode.is_whole() || own_rad > 0.0;
-        let notch = notched.then_some(due * (own_rad * ZERO_OF_HALF));
+        let late_ticks = core::mem::take(&mut self.late_ticks);
+        let due = wanted + late_ticks;
+        let mut notch = due * (own_rad * ZERO_OF_HALF);
+        // Where hexagons meet an edge has the length that it should have, and whatever time is left is zero voltage.
+        let beside_edge = |zero_rad: f32| due - nominal * (1.0 - zero_rad * ZERO_OF_HALF);
         if let Some(next) = self.gives_way_to().filter(|next| next.is_pattern()) {
+            let old_rad = middle60::zero_rad(self.mode, self.voltage_v, seen.udc_v);
             let next_rad = middle60::least_zero_rad(next, seen, &self.devices);
-            self.late_ticks = (own_rad - next_rad) * (2.0 * UNITS_PER_RADIAN) * ticks_per_unit;
+            notch = beside_edge(old_rad);
+            self.late_ticks = (old_rad - next_rad) * (2.0 * UNITS_PER_RADIAN) * ticks_per_unit;
+        } else if late_ticks != 0.0 {
+            notch = beside_edge(own_rad);
         }
+        self.voltage_v = seen.voltage_v;
+        let notched = !self.mode.is_whole() || own_rad > 0.0;
         let period_ticks = self.whole_ticks(wanted + self.late_ticks);
-        middle60::half(self.mode, self.next_half, period_ticks, notch, &self.devices)
+        middle60::half(self.mode, self.next_half, period_ticks, notched.then_some(notch), &self.devices)
     }
 
     /// The mode that takes over after the next half, if one does.

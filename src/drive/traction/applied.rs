@@ -85,13 +85,15 @@ pub(super) fn limits(
     // Edges can move at an optimised pattern's largest index, too.
     let is_all = mode.is_whole() || mode.is_optimal();
     let largest = if is_all { largest } else { REGULATION_ROOM * largest };
+    // The last half before another pattern leads to the point that the torque's trim asks for there.
+    let trimmed = if mode.is_pattern() && decision.after.is_pattern() { decision.after } else { mode };
     let (index_limit, filled) = exit.fill(mode, largest, steady.modulation_index, passed_s);
     ModeLimits {
         follows: follows(mode),
         index_limit,
         steady_share: 1.0,
         filled,
-        ripple_share: ripple_share(mode, steady.modulation_index),
+        ripple_share: ripple_share(trimmed, steady.modulation_index),
         settled: exit.is_settled(decision),
     }
 }

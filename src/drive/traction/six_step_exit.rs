@@ -99,7 +99,7 @@ impl SixStepExit {
 
     /// True once the load angle has followed a pattern that took over from another, when a decision is made.
     pub(super) fn is_settled(&mut self, decision: &Decision) -> bool {
-        let Decision { boundary, mode: decided } = *decision;
+        let Decision { boundary, mode: decided, .. } = *decision;
         let (mode, halves) = &mut self.unsettled;
         if decided != *mode {
             let grows = decided.is_pattern() && mode.is_pattern();
