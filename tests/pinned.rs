@@ -180,6 +180,7 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
                 demand: &demand,
                 window: walk.window.as_ref(),
                 udc_v,
+                change_v: 0.0,
                 link_scale: 1.0,
                 swing,
                 limits: &walk.limits,

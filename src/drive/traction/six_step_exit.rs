@@ -3,8 +3,12 @@
 use super::slot::Decision;
 use crate::frames::six_step_v;
 use crate::machine::Ratings;
-use crate::modulation::{Mode, TRANSITION_SECTORS};
+use crate::modulation::Mode;
 use crate::time::Instant;
+
+/// Sectors of 60° in which the load angle follows the voltage, where one pattern takes over from another. Chosen by trial: with one 12 N·m are
+/// missing at the end of square wave, with four 2.
+const TRANSITION_SECTORS: u32 = 4;
 
 /// Rate at which the voltage falls from square wave to the one that the torque needs, in shares of six-step per second.
 const EXIT_PER_S: f32 = 12.0;
@@ -19,14 +23,14 @@ const ONE_SIDED_SHARE: f32 = 0.001;
 /// decay against the link.
 const CROSSING_S: f32 = 2e-3;
 
-/// The exit ramp from square wave: voltage and torque on their way to what the torque needs, and a flux hexagon off its centre.
+/// The exit ramp from square wave: voltage and torque on their way to what the torque needs.
 pub(super) struct SixStepExit {
     /// Fundamental to which the voltage has fallen after square wave, as a share of six-step; 0 otherwise.
     filled_to: f32,
     /// The last torque, in N·m, none as the least positive one; 0 before the first. Its sign is the side of the flux circle on which the
     /// machine is: no torque lies with the positive ones there.
     side_nm: f32,
-    /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
+    /// Mode that the newest command was made for, and the halves in which its load angle still changes with the voltage.
     unsettled: (Mode, u32),
     /// The boundary that was counted last.
     counted: Instant,
@@ -56,8 +60,8 @@ impl SixStepExit {
     }
 
     /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
-    /// after it for as long as the voltage falls from there to what the torque `needed` in the last period: once the pattern has
-    /// grown.
+    /// after it for as long as the voltage falls from there to what the torque `needed` in the last period: once the load
+    /// angle has followed.
     pub(super) fn fill(&mut self, decided: Mode, largest: f32, needed: f32, period_s: f32) -> (f32, bool) {
         if decided.is_whole() {
             self.filled_to = 1.0;
@@ -93,10 +97,9 @@ impl SixStepExit {
         sided_nm
     }
 
-    /// True once a pattern has grown out of another when a decision is made: until then the flux hexagon is off its centre, on its way to
-    /// another size.
+    /// True once the load angle has followed a pattern that took over from another, when a decision is made.
     pub(super) fn is_settled(&mut self, decision: &Decision) -> bool {
-        let Decision { boundary, mode: decided } = *decision;
+        let Decision { boundary, mode: decided, .. } = *decision;
         let (mode, halves) = &mut self.unsettled;
         if decided != *mode {
             let grows = decided.is_pattern() && mode.is_pattern();
