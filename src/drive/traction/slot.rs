@@ -16,6 +16,13 @@ pub(super) struct Decision {
     pub after: Mode,
 }
 
+impl Decision {
+    /// `true` if an operating point for one holds for the other, too.
+    pub fn is_of(&self, other: &Self) -> bool {
+        self.boundary == other.boundary && self.mode == other.mode
+    }
+}
+
 /// The work of a control period. A boundary uses the last command that is valid by then, and of those before it nothing: so each
 /// command is made once, in the period before it is used, and its operating point one period earlier. Where a carrier half is shorter
 /// than two periods, both are made in one.

@@ -32,16 +32,19 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.controller.observe(&here, tables);
         self.revises = self.is_to_revise(slot.now, &input.command.demand);
         let commands = slot.commands || self.revises;
-        let aims = slot.aims || (commands && self.aimed != Some(slot.key));
+        let aims = slot.aims || (commands && !self.aimed.is_some_and(|aimed| aimed.is_of(&slot.key)));
+        let all_make_all = slot.between > 0;
         // Not in the longest periods, either.
-        if !commands || slot.between > 0 {
+        if !aims || all_make_all {
             self.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
             self.delay = self.delayed();
+        }
+        if slot.aims || (slot.commands && all_make_all) {
             self.look_ahead(input.sample.udc_v, slot);
         }
         // Once a half, and not in the longest periods unless all are.
-        if slot.commands && (!aims || slot.between > 0) {
+        if slot.commands && (!aims || all_make_all) {
             self.learn_angle(measured.angle, here.frame);
         }
         if let Some(at) = self.pulses.newest().map(|newest| newest.at)
@@ -59,15 +62,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
-    /// Follows the link's ripple and, where the command comes next, looks ahead to the halves that it counts and makes.
+    /// Follows the link's ripple, once a half, and looks ahead to the halves that the command counts and makes.
     #[inline(always)]
     fn look_ahead(&mut self, udc_v: f32, slot: &Slot) {
         let clock = &self.settings.clock;
         self.ripple.step(udc_v, clock.seconds(slot.now.since(self.link_seen)));
         self.link_seen = slot.now;
-        if let Some(newest) = self.pulses.newest()
-            && (slot.aims || slot.commands)
-        {
+        if let Some(newest) = self.pulses.newest() {
             let first_s = if slot.commands { 0.0 } else { clock.control_s };
             let begins = slot.key.boundary.after(newest.half.period_ticks);
             let horizon_s = clock.seconds(begins.since(slot.now));
