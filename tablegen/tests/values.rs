@@ -113,7 +113,7 @@ mod patterns {
     #[test]
     fn short_branches_are_followed_to_the_committed_angles() {
         let committed = include_str!("../../control/src/modulation/optimal/table.rs");
-        for name in ["opt3b", "opt5c"] {
+        for name in ["opp3b", "opp5c"] {
             let branch = BRANCHES.into_iter().find(|branch| branch.name == name).unwrap();
             let table = angle_table(&[branch.followed().unwrap()]);
             let own = &table[table.find("#[rustfmt::skip]").unwrap()..];
