@@ -13,8 +13,11 @@ use tractive::time::Clock;
 
 const REST: Command = Command::AT_REST;
 
+/// A command, and what shows that a request has it.
+type Level = (Command, fn(&Request) -> bool);
+
 /// Each level of a command by itself, and what a request then has.
-fn levels() -> [(Command, fn(&Request) -> bool); 7] {
+fn levels() -> [Level; 7] {
     [
         (Command { enable: true, ..REST }, |request| request.enable),
         (Command { with_torque: true, ..REST }, |request| request.with_torque),

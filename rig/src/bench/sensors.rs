@@ -100,12 +100,11 @@ impl Converter {
         if self.flaws.current_filter_s > 0.0 && dt_s > 0.0 {
             let steps = dt_s / self.flaws.current_filter_s;
             let kept = (-steps).exp();
-            for phase in 0..3 {
-                let (before_a, current_a) = (self.before_a[phase], currents_a[phase]);
+            let phases = self.filtered_a.iter_mut().zip(self.before_a).zip(currents_a);
+            for ((filtered_a, before_a), current_a) in phases {
                 // Behind a ramp by what it rises in a time constant.
                 let behind_a = (current_a - before_a) / steps;
-                self.filtered_a[phase] =
-                    current_a - behind_a + (self.filtered_a[phase] - before_a + behind_a) * kept;
+                *filtered_a = current_a - behind_a + (*filtered_a - before_a + behind_a) * kept;
             }
             self.before_a = currents_a;
         }

@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 use nucleo_g474re::pins::{Function, PINS, Pin, Port};
 use nucleo_g474re::position::{Absolute, Encoder, Position, Resolver};
+use nucleo_g474re::registers::Registers;
 use nucleo_g474re::sampling::{CONTROL, PWM};
 use nucleo_g474re::zs9;
 use std::collections::BTreeSet;
@@ -144,12 +145,14 @@ fn the_documentation_has_the_table_that_the_code_has() {
     }
 }
 
+/// A kind's configuration, and which pins are of it.
+type Kind = (fn(&Registers, &[Pin]), fn(&Pin) -> bool);
+
 /// The pins of a kind alone, each with its function, and no other pin touched.
 #[test]
 fn each_kind_of_pin_is_configured_by_itself() {
     use nucleo_g474re::pins::{configure_bus, configure_gates, configure_inputs};
-    use nucleo_g474re::registers::Registers;
-    let kinds: [(fn(&Registers, &[Pin]), fn(&Pin) -> bool); 3] = [
+    let kinds: [Kind; 3] = [
         (configure_inputs, |pin| !matches!(pin.function, Function::Gate(_) | Function::Bus(_))),
         (configure_bus, |pin| matches!(pin.function, Function::Bus(_))),
         (configure_gates, |pin| matches!(pin.function, Function::Gate(_))),
