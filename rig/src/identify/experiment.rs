@@ -15,6 +15,8 @@ use super::spread::BESIDE;
 use anyhow::{Result, ensure};
 use tractive::identification::Observation;
 
+/// Weight of the flux linkage's curvature beside a sample's residual, in squares of the bound: how smooth a machine is.
+const SMOOTHNESS: f64 = 4e-4;
 /// Phase current, as a share of the bound, whose sign is not sure.
 const SMALL_SHARE: f64 = 0.006;
 /// Rounds in which ripple, inductances and the angle's zero find each other: at least, at most, and the change of the zero, in rad, below
@@ -22,8 +24,6 @@ const SMALL_SHARE: f64 = 0.006;
 const LEAST_ROUNDS: u32 = 2;
 const MOST_ROUNDS: u32 = 10;
 const SAME_RAD: f64 = 2e-4;
-/// Straighter maps where no sample is, each tried where the one before bends so that a flux linkage there has more than one current.
-const STRAIGHTER: [f64; 3] = [3.0, 10.0, 30.0];
 /// Largest change of the zero in a round, in rad.
 const MOST_RAD: f64 = 0.1;
 
@@ -35,8 +35,6 @@ struct Experiment<'a> {
     half_s: f64,
     /// `true` if the first half begins with the upper devices on.
     falls: bool,
-    /// So many times as straight is the map where no sample is.
-    straighter: f64,
 }
 
 impl Experiment<'_> {
@@ -118,7 +116,7 @@ impl Experiment<'_> {
         scope: Scope,
     ) -> Equations {
         let mut equations = Equations::of(boundaries, basis, known, scope);
-        equations.smooth(basis, self.bound_a, self.straighter);
+        equations.smooth(basis, SMOOTHNESS * self.bound_a * self.bound_a);
         equations
     }
 
@@ -165,18 +163,8 @@ impl Experiment<'_> {
 /// Observations that do not tell the machine.
 pub fn fit(observations: &[Observation], bound_a: f64, half_s: f64) -> Result<Fit> {
     // The kind of the first half is not told: the one that explains more is it.
-    let solved = |straighter: f64| -> Result<Fit> {
-        let [rising, falling] =
-            [true, false].map(|falls| Experiment { observations, bound_a, half_s, falls, straighter }.fit());
-        let (rising, falling) = (rising?, falling?);
-        Ok(if rising.left_wb() < falling.left_wb() { rising } else { falling })
-    };
-    let mut fit = solved(1.0)?;
-    for straighter in STRAIGHTER {
-        if fit.is_invertible(bound_a) {
-            break;
-        }
-        fit = solved(straighter)?;
-    }
-    Ok(fit)
+    let tried = [true, false].map(|falls| Experiment { observations, bound_a, half_s, falls }.fit());
+    let [rising, falling] = tried;
+    let (rising, falling) = (rising?, falling?);
+    Ok(if rising.left_wb() < falling.left_wb() { rising } else { falling })
 }

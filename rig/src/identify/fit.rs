@@ -7,9 +7,6 @@ use super::spread::{BESIDE, Spread};
 use tractive::identification::Stage;
 use tractive_tablegen::FluxMap;
 
-/// Current over the bound up to which the polynomial is the map: ripple goes no further.
-const STRAIGHT_SHARE: f64 = 1.15;
-
 /// A flux linkage at a current, as the turning rotor shows it, and as the pulses do.
 #[derive(Clone, Copy, Debug)]
 pub struct Turning {
@@ -119,90 +116,15 @@ impl Fit {
         (per_s * self.dead_time_s + self.threshold_v, self.spread.error(&shares))
     }
 
-    /// Flux linkages at a current in A, whose co-energy beyond a circle has no more than its first and second derivative outward there: what no
-    /// sample is near has the incremental inductance of the circle. Still one co-energy's gradient: `W' = W + W_r h + W_rr h²/2`, `h = r − r₀`.
-    fn flux_further(&self, current: (f64, f64), from_a: f64) -> (f64, f64) {
-        let r = current.0.hypot(current.1);
-        if r <= from_a {
-            return self.flux(current.0, current.1);
-        }
-        let (h, out) = (r - from_a, (current.0 / r, current.1 / r));
-        let at = (from_a * out.0, from_a * out.1);
-        let of = |orders| self.basis.derivative(at, orders).iter().zip(&self.terms).map(|(a, b)| a * b).sum();
-        let (psi, [dd, dq, qq]) = (self.flux(at.0, at.1), self.inductances(at));
-        let [ddd, ddq, dqq, qqq]: [f64; 4] = [(3, 0), (2, 1), (1, 2), (0, 3)].map(of);
-        let (c, s) = out;
-        // Derivatives outward and around, the latter per rad.
-        let (w_r, w_t) = (psi.0 * c + psi.1 * s, from_a * (psi.1 * c - psi.0 * s));
-        let w_rr = dd * c * c + 2.0 * dq * c * s + qq * s * s;
-        let mixed = dq * (c * c - s * s) + (qq - dd) * c * s;
-        let third =
-            s * (qqq * s * c + dqq * (2.0 * c * c - s * s)) + c * (ddq * (c * c - 2.0 * s * s) - ddd * c * s);
-        let (w_rt, w_rrt) = (w_t / from_a + from_a * mixed, 2.0 * mixed + from_a * third);
-        let (along, around) = (w_r + w_rr * h, (w_t + w_rt * h + 0.5 * w_rrt * h * h) / r);
-        (along * c - around * s, along * s + around * c)
-    }
-
-    /// `true` if every flux linkage of the map's cells has one current.
-    pub(super) fn is_invertible(&self, bound_a: f64) -> bool {
-        let map = self.map(bound_a);
-        let columns = map.iq_a.len();
-        let step_a = (map.id_a[1] - map.id_a[0], map.iq_a[1] - map.iq_a[0]);
-        (0..map.id_a.len() - 1).flat_map(|r| (0..columns - 1).map(move |c| r * columns + c)).all(|at| {
-            let along_d = |psi: &[f64]| {
-                (psi[at + columns] - psi[at] + psi[at + columns + 1] - psi[at + 1]) / (2.0 * step_a.0)
-            };
-            let along_q = |psi: &[f64]| {
-                (psi[at + 1] - psi[at] + psi[at + columns + 1] - psi[at + columns]) / (2.0 * step_a.1)
-            };
-            let (dd, qq) = (along_d(&map.psi_d_wb), along_q(&map.psi_q_wb));
-            dd > 0.0 && dd * qq > along_q(&map.psi_d_wb) * along_d(&map.psi_q_wb)
-        })
-    }
-
     /// The map on a grid that the table generator takes: up to the bound and a little more, along +d a fifth of it.
     pub fn map(&self, bound_a: f64) -> FluxMap {
         const STEPS: i32 = 25;
         let current_a = |step: i32| crate::folder::digits(bound_a * f64::from(step) / f64::from(STEPS));
         let id_a: Vec<f64> = (-STEPS - 2..=5).map(current_a).collect();
         let iq_a: Vec<f64> = (-STEPS - 2..=STEPS + 2).map(current_a).collect();
-        let from_a = STRAIGHT_SHARE * bound_a;
-        let nodes = id_a.iter().flat_map(|id| iq_a.iter().map(|iq| self.flux_further((*id, *iq), from_a)));
+        let nodes = id_a.iter().flat_map(|id| iq_a.iter().map(|iq| self.flux(*id, *iq)));
         let short = crate::folder::digits;
         let (psi_d_wb, psi_q_wb) = nodes.map(|(d, q)| (short(d), short(q))).unzip();
         FluxMap { psi_d_wb, psi_q_wb, id_a, iq_a }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::DMatrix;
-
-    #[test]
-    fn the_map_beyond_the_circle_is_still_one_co_energys_gradient() {
-        let basis = Basis::new(100.0);
-        let terms: Vec<f64> = (0..basis.len()).map(|k| (1.0 + k as f64).sin() / (1.0 + k as f64)).collect();
-        let spread = Spread { factor: DMatrix::zeros(0, 0), lengths: Vec::new(), sigma: 0.0 };
-        let fit = Fit {
-            basis,
-            terms,
-            resistance_ohm: 0.0,
-            dead_time_s: 0.0,
-            threshold_v: 0.0,
-            zero_rad: 0.0,
-            residuals: Vec::new(),
-            still: Vec::new(),
-            turning: Vec::new(),
-            spread,
-        };
-        let (flux, step_a) = (|d: f64, q: f64| fit.flux_further((d, q), 90.0), 1e-4);
-        for (d, q) in [(-80.0, 60.0), (-100.0, 20.0), (-70.0, -95.0), (15.0, 100.0)] {
-            let by_q = (flux(d, q + step_a).0 - flux(d, q - step_a).0) / (2.0 * step_a);
-            let by_d = (flux(d + step_a, q).1 - flux(d - step_a, q).1) / (2.0 * step_a);
-            assert!((by_q - by_d).abs() < 1e-6 * (1.0 + by_q.abs()), "{d}, {q}: {by_q}, {by_d}");
-        }
-        let (within, beyond) = (flux(-53.999, 71.999), flux(-54.001, 72.001));
-        assert!((within.0 - beyond.0).hypot(within.1 - beyond.1) < 1e-3, "{within:?}, {beyond:?}");
     }
 }
