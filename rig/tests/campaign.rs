@@ -63,7 +63,7 @@ fn nothing_escapes_the_optimised_patterns() {
     let lost: Vec<_> = outcomes.iter().filter(|outcome| is_lost(outcome)).collect();
     assert!(lost.is_empty(), "{lost:#?}");
     let modes: BTreeSet<_> = outcomes.iter().map(|outcome| outcome.mode.as_str()).collect();
-    assert!(modes.iter().filter(|mode| mode.starts_with("opt")).count() >= 7, "{modes:?}");
+    assert!(modes.iter().filter(|mode| mode.starts_with("opp")).count() >= 7, "{modes:?}");
 }
 
 /// The parts that are switched off, and the cases of which one must then be lost.
