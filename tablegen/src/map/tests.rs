@@ -116,3 +116,103 @@ fn nodes_in_order() {
     ];
     assert_eq!((largest(&nodes), largest(&nodes[1..]), largest(&[])), (3.0, 2.0, 0.0));
 }
+
+/// A deviation as large as the tolerance is measurement, and beyond it is not: 1 % of 100 Wb, a thousandth of a step of 1,000 A.
+#[test]
+fn what_is_even_within_the_tolerance() {
+    let file = Path::new("flux_map.csv");
+    let of = |off_a: f64, off_d: f64, off_q: f64| {
+        let iq = [-1_000.0 + off_a, 0.0, 1_000.0];
+        let psi = [(100.0 - off_d, -50.0 + off_q), (80.0, 0.0), (100.0, 50.0)];
+        let nodes: Vec<_> = (2..)
+            .zip(iq.into_iter().zip(psi))
+            .map(|(line, (iq, (psi_d, psi_q)))| Node { line, id: 0.0, iq, psi_d, psi_q })
+            .collect();
+        check_even(&nodes, &iq, file)
+    };
+    for (off_d, off_q, good) in [
+        (0.0, 0.0, true),
+        (1.0, 0.0, true),
+        (-0.9, 0.9, true),
+        (0.0, 1.0, true),
+        (0.0, -1.0, true),
+        (1.01, 0.0, false),
+        (0.0, 1.01, false),
+        (0.0, -1.01, false),
+    ] {
+        assert_eq!(of(0.0, off_d, off_q).is_ok(), good, "{off_d} {off_q}");
+    }
+    let map = of(0.0, 0.5, 0.25).unwrap();
+    assert_eq!(map.psi_d_wb, [99.75, 80.0, 99.75]);
+    assert_eq!(map.psi_q_wb, [-49.875, 0.0, 49.875]);
+    // The first step is the one that counts: it has the deviation, too.
+    assert!(of(0.9, 0.0, 0.0).is_ok() && of(-1.0, 0.0, 0.0).is_ok() && of(1.1, 0.0, 0.0).is_err());
+    assert!(of(-1.1, 0.0, 0.0).is_err());
+    let shifted = [-999.5, 0.5, 1_000.5];
+    let nodes = shifted.map(|iq| Node { line: 2, id: 0.0, iq, psi_d: 1.0, psi_q: 0.001 * (iq - 0.5) });
+    assert!(check_even(&nodes, &shifted, file).is_ok(), "a span of a thousandth of the step");
+}
+
+#[test]
+fn one_sign_of_iq_is_mirrored() {
+    let file = Path::new("flux_map.csv");
+    let iq = [0.0, 1.0, 2.0];
+    let of = |centre: f64| {
+        let psi = [(100.0, centre), (90.0, 20.0), (70.0, 30.0)];
+        let nodes: Vec<_> = iq
+            .into_iter()
+            .zip(psi)
+            .map(|(iq, (psi_d, psi_q))| Node { line: 2, id: 0.0, iq, psi_d, psi_q })
+            .collect();
+        mirror(&nodes, &iq, file)
+    };
+    for (centre, good) in [(1.0, true), (-1.0, true), (1.01, false), (-1.01, false)] {
+        assert_eq!(of(centre).is_ok(), good, "{centre}");
+    }
+    let map = of(0.5).unwrap();
+    assert_eq!(map.iq_a, [-2.0, -1.0, 0.0, 1.0, 2.0]);
+    assert_eq!(map.psi_d_wb, [70.0, 90.0, 100.0, 90.0, 70.0]);
+    assert_eq!(map.psi_q_wb, [-30.0, -20.0, 0.0, 20.0, 30.0]);
+}
+
+/// A thousandth of a step: of a mean of 1,000 A, one.
+#[test]
+fn an_axis_is_even_within_a_thousandth_of_its_step() {
+    let file = Path::new("flux_map.csv");
+    let of = |off: f64| {
+        let id = [-3_000.0, -2_000.0 + off, -1_000.0, 0.0];
+        let nodes: Vec<_> =
+            id.into_iter().flat_map(|id| [0.0, 1.0, 2.0, 3.0].map(|iq| node(9, id, iq))).collect();
+        axes(&nodes, file)
+    };
+    assert_eq!(of(1.0).unwrap(), (vec![-3_000.0, -1_999.0, -1_000.0, 0.0], vec![0.0, 1.0, 2.0, 3.0]));
+    assert!(of(-1.0).is_ok() && of(1.01).is_err() && of(-1.01).is_err());
+    let from = |first: f64| {
+        let nodes: Vec<_> = (0..16).map(|k| node(9, f64::from(k / 4), first + f64::from(k % 4))).collect();
+        axes(&nodes, file).is_ok()
+    };
+    assert!(from(0.0) && from(-1.5) && !from(0.1));
+}
+
+/// Not even the same flux linkage twice.
+#[test]
+fn flux_rises_with_its_own_current() {
+    let file = Path::new("flux_map.csv");
+    let of = |psi_d: [f64; 4], psi_q: [f64; 4]| {
+        let nodes: Vec<_> = (0..4_u32)
+            .map(|k| Node {
+                line: 2 + u64::from(k),
+                id: f64::from(k / 2),
+                iq: f64::from(k % 2),
+                psi_d: psi_d[k as usize],
+                psi_q: psi_q[k as usize],
+            })
+            .collect();
+        check_monotone(&nodes, 2, file).err().map(|error| error.to_string())
+    };
+    assert_eq!(of([0.0, 0.5, 1.0, 0.6], [0.0, 1.0, -3.0, -2.0]), None);
+    let said = of([0.0, 0.5, 1.0, 0.5], [0.0, 1.0, -3.0, -2.0]).unwrap();
+    assert!(said.contains("csv:5: psi_d_wb: 0.5: must rise with id_a, above 0.5 of line 3"), "{said}");
+    let said = of([0.0, 0.5, 1.0, 0.6], [0.0, 1.0, -3.0, -3.0]).unwrap();
+    assert!(said.contains("csv:5: psi_q_wb: -3: must rise with iq_a, above -3 of line 4"), "{said}");
+}

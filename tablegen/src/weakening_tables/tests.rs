@@ -226,6 +226,9 @@ fn currents_are_moved_along_their_torque() {
         for share in [1.01, 0.99, 1.000_001] {
             assert_eq!(circles.moved((id, iq), torque_nm, share * from_wb, 0.98 * from_wb), (id, iq));
         }
+        // On the circle itself already, but of another torque.
+        let (moved_d, moved_q) = circles.moved((id, iq), 1.01 * torque_nm, from_wb, from_wb * (1.0 + 1e-14));
+        near(IPM.torque_nm(moved_d, moved_q), 1.01 * torque_nm, 1e-8);
         // No current has that torque there.
         assert_eq!(circles.moved((id, iq), torque_nm, from_wb, 1e-4), (id, iq));
         // Below the least i_d, or beyond the map.
