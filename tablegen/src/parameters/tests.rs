@@ -65,7 +65,7 @@ fn orders_of_the_reference_machine() {
     }
 }
 
-/// What may be equal is good at equality, and not just beyond; the other way round where it may not.
+/// Equal values are good where they may be equal, and values just beyond are not; the other way round where they may not.
 #[test]
 fn orders_at_equality() {
     for (line, beyond) in [

@@ -68,7 +68,7 @@ fn a_bicubic_surface_is_kept() {
     }
 }
 
-/// Where there is one current for a flux linkage, it is found from anywhere, and only as near as it says.
+/// The one current for a flux linkage is found from anywhere, but for starts that are too far.
 #[test]
 fn the_inverse_of_a_straight_map() {
     let machine = crate::testing::IPM.folder(&[]);

@@ -81,7 +81,7 @@ fn parameters_are_read_between_nodes() {
     }
 }
 
-/// Where the parameters are constants, one pass is the closed form, within what a line between two nodes of the universal curve is off.
+/// One pass is the closed form with parameters that are constants, within what a line between two nodes of the universal curve is off.
 #[test]
 fn two_passes_are_the_best_current() {
     let grid = parameter_grid(&IPM, &Regular { psi_f_wb: 0.01, saliency_h: 0.001 });

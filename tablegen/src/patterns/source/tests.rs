@@ -13,7 +13,7 @@ fn three_equations_are_solved() {
     }
 }
 
-/// What is left, as a share of the distortion, has no part along any of the three powers.
+/// The rest, as a share of the distortion, has no part along any of the three powers.
 #[test]
 fn the_fit_leaves_least_squares() {
     let branch = BRANCHES.into_iter().find(|branch| branch.name == "opp5b").unwrap();
