@@ -33,3 +33,6 @@ pub(crate) fn grid<const N: usize>(rows: Axis, columns: Axis, nodes: Vec<[f32; N
         nodes: nodes.leak(),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -98,3 +98,6 @@ fn highest_id_a(point: &Point, map: &SmoothMap, parameters: &Parameters) -> Opti
     }
     Some(low.min(0.0))
 }
+
+#[cfg(test)]
+mod tests;

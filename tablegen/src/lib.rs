@@ -25,6 +25,8 @@ pub mod patterns;
 mod rust_source;
 mod smooth;
 mod tables;
+#[cfg(test)]
+mod testing;
 mod weakening;
 mod weakening_tables;
 

@@ -357,3 +357,6 @@ fn line_at(nodes: &[Node], cell: &Cell) -> Option<u64> {
     let image = || nodes.iter().find(|node| (node.id, node.iq) == (cell.id, -cell.iq));
     own.or_else(image).map(|node| node.line)
 }
+
+#[cfg(test)]
+mod tests;

@@ -81,3 +81,6 @@ fn largest(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     }
     0.5 * (a + b)
 }
+
+#[cfg(test)]
+mod tests;

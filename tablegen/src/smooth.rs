@@ -248,3 +248,6 @@ fn derivatives(values: &[f64]) -> Vec<f64> {
     }
     right
 }
+
+#[cfg(test)]
+mod tests;

@@ -247,3 +247,6 @@ fn ratings(parameters: &Parameters, magnet_flux_wb: f64) -> Ratings {
         torque_slew_nm_s: parameters.torque_slew_nm_per_s as f32,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -152,6 +152,7 @@ pub(crate) fn at_id(id: f64, wanted_nm: f64, optimum: &Optimum, max_current_a: f
 mod tests {
     use super::*;
     use crate::MachineFolder;
+    use crate::testing::{IPM, near};
     use std::path::Path;
 
     /// Shares of a circle's torque, little ones above all.
@@ -183,5 +184,107 @@ mod tests {
             }
         }
         assert!(on > 300 && inside > 10 && worst < 0.004, "{on}, {inside}, {worst}");
+    }
+
+    fn linear() -> (MachineFolder, SmoothMap) {
+        let machine = IPM.folder(&[]);
+        let smooth = SmoothMap::new(&machine.map);
+        (machine, smooth)
+    }
+
+    /// The most torque on a circle of a machine without saturation, by load angle, within the largest current.
+    fn most_nm(psi_wb: f64, most_a: f64, least_id_a: f64) -> f64 {
+        let at = |angle: f64| {
+            let (id, iq) = ((psi_wb * angle.cos() - 0.2) / 0.006, psi_wb * angle.sin() / 0.015);
+            (id.hypot(iq) <= most_a && id >= least_id_a).then(|| IPM.torque_nm(id, iq))
+        };
+        let angles = (0..=200_000).map(|k| std::f64::consts::PI * f64::from(k) / 200_000.0);
+        angles.filter_map(at).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    #[test]
+    fn circles_of_a_linear_machine() {
+        let (machine, smooth) = linear();
+        for (psi_wb, most_a) in
+            [(0.1, 20.0), (0.14, 20.0), (0.18, 20.0), (0.22, 20.0), (0.25, 12.0), (0.3, 20.0)]
+        {
+            let circle = circle(psi_wb, &SHARES, &smooth, &machine, most_a);
+            near(circle.torque_nm, most_nm(psi_wb, most_a, -1e9), 1e-4);
+            assert_eq!(circle.currents_a.len(), SHARES.len());
+            for ((id, iq), share) in circle.currents_a.into_iter().zip(SHARES) {
+                let torque_nm = IPM.torque_nm(id, iq);
+                assert!(
+                    (torque_nm - share * circle.torque_nm).abs() < 1e-8 * circle.torque_nm,
+                    "{torque_nm}"
+                );
+                let (psi_d, psi_q) = IPM.flux_wb(id, iq);
+                let on = (psi_d.hypot(psi_q) / psi_wb - 1.0).abs() < 1e-9;
+                let entered = (id.hypot(iq) <= most_a) && psi_d.hypot(psi_q) < psi_wb;
+                assert!(on || entered || id == 2.0, "{psi_wb} {share}: {id}, {iq}");
+                assert!(on || share < 0.99 || id == 2.0, "{psi_wb}: the most torque is on the circle");
+                assert!(id <= 2.0 && iq >= -1e-9 && id.hypot(iq) <= most_a * (1.0 + 1e-9), "{id}, {iq}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_circle_that_no_current_reaches_gives_nothing() {
+        let (mut machine, smooth) = linear();
+        let of = |machine: &MachineFolder| circle(0.02, &SHARES, &smooth, machine, 18.0);
+        let Circle { torque_nm, currents_a } = of(&machine);
+        assert_eq!((torque_nm, currents_a), (TINY_TORQUE_NM, vec![(-18.0, 0.0); 8]));
+        machine.parameters.min_id_a = -11.0;
+        assert_eq!(of(&machine).currents_a, vec![(-11.0, 0.0); 8]);
+    }
+
+    #[test]
+    fn circles_keep_the_least_id() {
+        let (mut machine, smooth) = linear();
+        machine.parameters.min_id_a = -6.0;
+        for psi_wb in [0.18, 0.22, 0.3] {
+            let circle = circle(psi_wb, &SHARES, &smooth, &machine, 20.0);
+            near(circle.torque_nm, most_nm(psi_wb, 20.0, -6.0), 1e-4);
+            assert!(circle.currents_a.iter().all(|(id, _)| *id >= -6.0 - 1e-9), "{:?}", circle.currents_a);
+        }
+    }
+
+    /// The arc rises from point to point, and ends at its summit; beyond what it reaches, the summit stands.
+    #[test]
+    fn an_arc_rises_to_its_summit() {
+        let (machine, smooth) = linear();
+        let optimum = Optimum::new(&smooth, &machine.parameters);
+        for psi_wb in [0.14, 0.2, 0.26] {
+            let arc = rising_arc(psi_wb, &smooth, &optimum, |point| point.id.hypot(point.iq) <= 20.0);
+            assert!(arc.len() > 10 && arc.windows(2).all(|pair| pair[0].torque <= pair[1].torque));
+            for point in &arc {
+                let (psi_d, psi_q) = IPM.flux_wb(point.id, point.iq);
+                near(psi_d, psi_wb * point.angle.cos(), 1e-9);
+                near(psi_q, psi_wb * point.angle.sin(), 1e-9);
+                near(point.torque, IPM.torque_nm(point.id, point.iq), 1e-9);
+            }
+            let top = arc[arc.len() - 1];
+            let (id, iq) = on_arc(&arc, 2.0 * top.torque, psi_wb, &smooth, &optimum);
+            assert!((id - top.id).abs() < 1e-6 && (iq - top.iq).abs() < 1e-6);
+            for wanted_nm in
+                [arc[0].torque + 0.01 * top.torque, 0.5 * (arc[0].torque + top.torque), 0.999 * top.torque]
+            {
+                let (id, iq) = on_arc(&arc, wanted_nm, psi_wb, &smooth, &optimum);
+                near(IPM.torque_nm(id, iq), wanted_nm, 1e-9);
+                let (psi_d, psi_q) = IPM.flux_wb(id, iq);
+                near(psi_d.hypot(psi_q), psi_wb, 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn torque_at_an_id() {
+        let (machine, smooth) = linear();
+        let optimum = Optimum::new(&smooth, &machine.parameters);
+        for (id, wanted_nm) in [(-10.0, 12.0), (0.0, 7.0), (2.0, 1.0), (-20.0, 3.0)] {
+            let (own, iq) = at_id(id, wanted_nm, &optimum, 20.0);
+            assert_eq!(own, id);
+            near(iq, wanted_nm / (4.5 * (0.2 - 0.009 * id)), 1e-9);
+        }
+        assert_eq!(at_id(0.0, 1e3, &optimum, 20.0), (0.0, 20.0));
     }
 }

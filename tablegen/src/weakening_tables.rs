@@ -338,3 +338,6 @@ impl<'a> Circles<'a> {
         (without, rise.fold(0.0, f64::max))
     }
 }
+
+#[cfg(test)]
+mod tests;

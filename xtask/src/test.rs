@@ -39,7 +39,8 @@ const CONTROL: &str = "tractive-control";
 const CONTROL_PARTS: [&[&str]; 2] =
     [&["--lib", "--features", "optimal", "modulation"], &["--test", "pulses", "--features", "optimal"]];
 const TABLEGEN: &str = "tractive-tablegen";
-const TABLEGEN_PARTS: [&[&str]; 1] = [&["--test", "patterns", "--test", "values", "--features", "patterns"]];
+const TABLEGEN_PARTS: [&[&str]; 1] =
+    [&["--lib", "--test", "patterns", "--test", "values", "--features", "patterns"]];
 const DRIVE: &str = "tractive";
 const DRIVE_PARTS: [&[&str]; 1] = [&["--test", "pinned", "--features", "optimal"]];
 

@@ -156,3 +156,6 @@ fn spread(start: u32, count: usize) -> Vec<f64> {
     angles.sort_by(f64::total_cmp);
     angles
 }
+
+#[cfg(test)]
+mod tests;

@@ -122,3 +122,6 @@ impl Problem<'_> {
         (inside && apart).then_some(angles)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -79,3 +79,6 @@ fn solved(matrix: [[f64; 3]; 3], right: [f64; 3]) -> [f64; 3] {
         determinant(replaced) / whole
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -47,3 +47,6 @@ impl TorqueRipple {
         WEIGHT * libm::pow(mean, 2.0 / f64::from(EXPONENT))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -84,3 +84,6 @@ impl Waveform<'_> {
 fn signs() -> impl Iterator<Item = f64> {
     [-1.0, 1.0].into_iter().cycle()
 }
+
+#[cfg(test)]
+mod tests;
