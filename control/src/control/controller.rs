@@ -86,8 +86,6 @@ pub struct Controller {
     target: Target,
     /// Stator resistance over its rating.
     resistance_ratio: f32,
-    /// The magnets' flux linkage over the map's, less 1.
-    magnet_share: f32,
 }
 
 impl Controller {
@@ -115,7 +113,6 @@ impl Controller {
             flowing_nm: 0.0,
             target: Target::NONE,
             resistance_ratio: 1.0,
-            magnet_share: 0.0,
         }
     }
 }
@@ -157,22 +154,18 @@ impl ControlLaw for Controller {
 
     #[inline(never)]
     fn warm(&mut self, warmth: Warmth, law: &Law) {
-        self.resistance_ratio = warmth.resistance_ratio();
+        let (ratio, doubt) = (warmth.resistance_ratio(), law.gains.resistance_doubt);
+        let explained = if doubt > 0.0 { (ratio - self.resistance_ratio) / doubt } else { 0.0 };
+        self.resistance_ratio = ratio;
         let (current, tables) = (self.target.current, law.tables);
-        let flux = flux_linkage(tables, current);
-        let from_a = law.gains.resistance_from * tables.ratings.max_current_a;
-        // The voltage of all that the magnets have, at 1 rad/s.
-        let seen = Dq { d: 0.0, q: -tables.ratings.magnet_flux_wb };
-        let whole = map_error::share_of(seen, 1.0, current, flux, from_a);
-        let share = warmth.magnet_share();
-        let new = whole * (share - self.magnet_share);
-        self.magnet_share = share;
-        self.map_error.warm(warmth.scales(current, flux, tables), whole * share, new);
+        let scales = warmth.scales(current, flux_linkage(tables, current), tables);
+        self.map_error.warm(scales, warmth.magnet_share(), explained);
     }
 
     fn idle(&mut self) {
         self.demand = demand::Shaper::new();
         self.disturbance = disturbance::Observer::new();
+        self.map_error.begin(Dq::default(), 0.0);
         self.trim = torque_trim::TorqueTrim::new();
         self.link = link_filter::LinkFilter::new();
         self.path = flux_path::FluxPath::new();
@@ -198,6 +191,7 @@ impl ControlLaw for Controller {
         let resistance = self.resistance_ohm(law.tables);
         let input = disturbance::Input { boundary, sample, omega, resistance, sixth };
         self.disturbance.step(&input, law.gains);
+        self.map_error.see(sample.flux, sample.current, omega, law.gains.observer);
     }
 
     fn aim(&mut self, input: &AimInput, law: &Law) {
@@ -216,7 +210,11 @@ impl ControlLaw for Controller {
         let demand_nm = self.demand.step(&shaping, ratings);
         let link = self.link.step(udc_v * link_scale, period_s);
         let most = limits.index_limit * limits.steady_share;
-        let limit = VoltageLimit { udc_v: link.slow_v / flux, modulation_index: most, filled: limits.filled };
+        let limit = VoltageLimit {
+            udc_v: link.slow_v / (flux * link_scale),
+            modulation_index: most,
+            filled: limits.filled,
+        };
         let trim_nm = self.trim.trim_nm(demand_nm, limits.ripple_share, ratings.max_torque_nm);
         let damping_nm = swing.map_or(0.0, |swing| {
             swing.damping_nm(law.gains.link_damping, demand_nm, omega, ratings.max_torque_nm)
@@ -248,17 +246,17 @@ impl ControlLaw for Controller {
             modulation_index,
             voltage_limit_v: limits.index_limit * six_step_v(link.usable_v),
         };
-        let OperatingPoint { current, flux, .. } = point;
+        self.map_error.aim(1.0 - link_scale, period_s);
+    }
+
+    fn explain(&mut self, law: &Law) {
         self.map_error.step(&map_error::Input {
             disturbance: self.disturbance.mean(),
-            explained: 1.0 - link_scale,
-            current,
-            flux,
-            omega,
-            period_s,
-            resistance_from: law.gains.resistance_from,
-            largest_a: ratings.max_current_a,
-            fastest: ratings.max_speed_rad_s * ratings.pole_pairs,
+            current: self.target.current,
+            omega: self.speed.omega(),
+            resistance: self.resistance_ohm(law.tables),
+            resistance_doubt: law.gains.resistance_doubt,
+            tables: law.tables,
         });
     }
 
@@ -286,7 +284,7 @@ impl ControlLaw for Controller {
         let current_loop::Output { voltage, steady } = current_loop::step(&input, law.gains);
         let regulates_by_pulses = limits.follows.is_direct();
         let starts_flying = committed.volt_seconds.is_none() && !regulates_by_pulses;
-        let vector = if starts_flying { self.start_flying(ahead.flux) } else { voltage.vector };
+        let vector = if starts_flying { self.start_flying(ahead.flux, law.tables) } else { voltage.vector };
         let vector = vector.unpark(sample.frame);
         let steadies = regulates_by_pulses || starts_flying;
         VoltageVector {
@@ -313,13 +311,17 @@ impl Controller {
         if flux == point.flux { flux } else { demagnetisation::kept(flux, point.current.q, tables) }
     }
 
-    /// EMF of the `present` flux linkage in Wb, from which a pattern will lead to that of the operating point, in V: as far as the map's
+    /// EMF of the `present` flux linkage by the map in Wb, from which a pattern will lead to that of the operating point, in V: as far as the map's
     /// error is known, and with it what it will leave unexplained there.
-    fn start_flying(&mut self, present: Dq) -> Dq {
+    fn start_flying(&mut self, present: Dq, tables: &Tables) -> Dq {
         let omega = self.speed.omega();
-        let scaled = omega * self.map_error.caught_scale();
-        self.disturbance.expect(self.target.flux.j() * (omega - scaled));
-        present.j() * scaled
+        let more_wb = |flux: Dq| self.map_error.more_wb(flux, &tables.ratings);
+        let (present, unexplained) = (present + more_wb(present), more_wb(self.target.flux));
+        if unexplained != Dq::default() {
+            self.disturbance.expect(unexplained.j() * -omega);
+            self.map_error.begin(self.target.flux, omega);
+        }
+        present.j() * omega
     }
 }
 

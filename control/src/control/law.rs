@@ -97,6 +97,10 @@ pub trait ControlLaw {
     /// changes. A law that knows nothing of temperatures goes on as rated.
     fn warm(&mut self, _warmth: Warmth, _law: &Law) {}
 
+    /// Finds what machine and link differ by from what they are taken for, of the voltage that is unexplained: a part of it; call while pulses are made, at most once in a
+    /// control period, where there is time.
+    fn explain(&mut self, _law: &Law) {}
+
     /// Forgets what it has learnt but for the speed, as the gates are off.
     fn idle(&mut self);
 

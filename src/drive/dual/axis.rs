@@ -199,6 +199,7 @@ impl<L: ControlLaw> Axis<L> {
                 length_s: TURNS as f32 * period_s,
             };
             self.controller.learn(&boundary, &sample, limits.follows, &law);
+            self.controller.explain(&law);
         }
         let voltage = self.controller.regulate(&sample, &committed, &limits, &law);
         let target = self.controller.target();

@@ -89,7 +89,7 @@ impl Settings {
                 carrier: 0.6,
                 observer: TURNS as f32 * 0.02,
                 sixth_turn_rad: TURNS as f32 * Gains::DEFAULT.sixth_turn_rad,
-                resistance_from: 4.0,
+                resistance_doubt: 4.0,
                 ..Gains::DEFAULT
             },
             speed: SpeedDesign {

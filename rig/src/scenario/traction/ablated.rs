@@ -105,6 +105,10 @@ impl ControlLaw for Ablated {
         }
     }
 
+    fn explain(&mut self, law: &Law) {
+        self.controller.explain(law);
+    }
+
     fn aim(&mut self, input: &AimInput, law: &Law) {
         let gains = self.gains(law.gains);
         self.controller.aim(input, &Law { gains: &gains, ..*law });

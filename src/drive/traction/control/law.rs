@@ -38,6 +38,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
             self.delay = self.delayed();
+            let Settings { gains, clock, .. } = &self.settings;
+            self.controller.explain(&Law { gains, clock, tables });
         }
         // Once a half, and not in the longest periods unless all are.
         if slot.commands && (!aims || slot.between > 0) {
