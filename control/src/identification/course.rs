@@ -101,9 +101,11 @@ const ALONG_Q: u32 = 400;
 const ALONG_BOTH: u32 = 2_300;
 const REST: u32 = 16;
 
-/// Share of the bound at which the pulses along q begin, and what each command adds to it.
+/// Share of the bound at which the pulses along d and along q begin, and what each command adds to it: outward step by step, so that each step is
+/// known from the one before it.
 const FIRST_BOUND: f32 = 0.2;
-const WIDENING: f32 = 0.003;
+const WIDENING_D: f32 = 0.006;
+const WIDENING_Q: f32 = 0.002;
 
 /// Current along d beside the pulses along q and of the turning rotor, as a share of the bound: no phase is without current for long. Beside
 /// the last pulses it goes to and fro between two shares. Ways in a command, at first and growing by as much with each command: no two ways
@@ -291,13 +293,11 @@ impl Course {
             }
             Stage::AlongD => {
                 let back = Dq { d: 0.0, q: self.pulses.back_share(ratings.pole_pairs) };
-                let region = region(1.0, back);
+                let region = region(self.widened(WIDENING_D), back);
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::AlongQ => {
-                // Outward step by step, so that each step is known from the one before it.
-                let share = limit(FIRST_BOUND + self.commands as f32 * WIDENING, FIRST_BOUND, 1.0);
-                let region = region(share, Dq { d: HELD_D, q: 0.0 });
+                let region = region(self.widened(WIDENING_Q), Dq { d: HELD_D, q: 0.0 });
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::AlongBoth => {
@@ -311,6 +311,11 @@ impl Course {
                 Self::lead(ahead, Dq { d: HELD_D, q: share } * bound_a, bound_a)
             }
         }
+    }
+
+    /// The share of the bound that pulses keep to, so far.
+    fn widened(&self, each: f32) -> f32 {
+        limit(FIRST_BOUND + self.commands as f32 * each, FIRST_BOUND, 1.0)
     }
 
     /// The slow sweep along d, as a share of the bound.

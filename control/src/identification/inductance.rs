@@ -10,6 +10,42 @@ struct Matrix {
     qq: f32,
 }
 
+impl Matrix {
+    /// The one that so much of the way lies on to another.
+    fn towards(self, other: Self, share: f32) -> Self {
+        let between = |from: f32, to: f32| from + share * (to - from);
+        Self { dd: between(self.dd, other.dd), dq: between(self.dq, other.dq), qq: between(self.qq, other.qq) }
+    }
+
+    /// This share of it.
+    fn times(self, share: f32) -> Self {
+        Self { dd: share * self.dd, dq: share * self.dq, qq: share * self.qq }
+    }
+
+    /// With a share of so much more, its own inductances not below a floor, in H.
+    fn with(self, more: Self, share: f32, floor_h: f32) -> Self {
+        let own = |known: f32, more: f32| {
+            let changed = known + share * more;
+            if changed > floor_h { changed } else { floor_h }
+        };
+        let (dd, qq) = (own(self.dd, more.dd), own(self.qq, more.qq));
+        let dq = self.dq + share * more.dq;
+        let most = COUPLING * dd * qq;
+        Self { dd, dq: if dq * dq > most { dq * (most / (dq * dq)) } else { dq }, qq }
+    }
+}
+
+/// A place in the plane, between four points whose inductances are remembered.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// The point of the least current along d and along q, and its column.
+    point: usize,
+    column: usize,
+    /// Part of the way to the next ones along d and along q.
+    d: f32,
+    q: f32,
+}
+
 /// Share of what a half shows that is believed at once.
 const GAIN: f32 = 0.7;
 /// Weight of the coupling of both axes beside their own inductances, where a change of current does not tell them apart.
@@ -20,11 +56,15 @@ const COUPLING: f32 = 0.6;
 const LEAST_SHARE: f32 = 0.4;
 const MOST_SHARE: f32 = 1.4;
 const FLOOR_SHARE: f32 = 0.5;
+/// Share of the inductance that is expected where a current goes outward along q for the first time: iron saturates, and a current that is
+/// expected to move further is reversed earlier.
+const OUTWARD: f32 = 0.7;
 
-/// Fields of the plane of currents, in which each inductance is remembered: along d from beyond the bound on, along q for both signs.
+/// Points of the plane of currents, at which each inductance is remembered and between which it changes evenly: along d from beyond the bound on,
+/// along q for both signs.
 const ALONG_D: usize = 9;
 const ALONG_Q: usize = 8;
-/// Fields in a bound of current.
+/// Points in a bound of current.
 const PER_BOUND: f32 = 6.5;
 /// Place of no current along d.
 const MIDDLE_D: f32 = 7.0;
@@ -32,10 +72,10 @@ const MIDDLE_D: f32 = 7.0;
 /// Inductances all over the plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Inductance {
-    /// The one of the present current.
+    /// The one of the present current, and its place.
     here: Matrix,
-    field: usize,
-    fields: [Option<Matrix>; ALONG_D * ALONG_Q],
+    place: Place,
+    points: [Option<Matrix>; ALONG_D * ALONG_Q],
     /// The newest of each current along q, whatever flows along d: iron saturates along q with it.
     along_q: [Option<Matrix>; ALONG_Q],
     /// Share of the coupling that acts here: odd in the current along q.
@@ -53,8 +93,8 @@ impl Inductance {
         let here = Matrix { dd: henry, dq: 0.0, qq: henry };
         Self {
             here,
-            field: usize::MAX,
-            fields: [None; ALONG_D * ALONG_Q],
+            place: Place { point: 0, column: 0, d: 0.0, q: 0.0 },
+            points: [None; ALONG_D * ALONG_Q],
             along_q: [None; ALONG_Q],
             coupled: 1.0,
             floor_h: 0.0,
@@ -80,8 +120,8 @@ impl Inductance {
     /// The least that was seen along d so far is the measure of the least of all.
     pub fn settle(&mut self) {
         let mut least_h = self.here.dd;
-        // Without current along q: the first field of each row.
-        for known in self.fields.iter().step_by(ALONG_Q).flatten() {
+        // Without current along q: the first point of each row.
+        for known in self.points.iter().step_by(ALONG_Q).flatten() {
             if known.dd < least_h {
                 least_h = known.dd;
             }
@@ -89,22 +129,34 @@ impl Inductance {
         self.floor_h = FLOOR_SHARE * least_h;
     }
 
-    /// Moves to a current, in A: what is remembered of it holds, where it has been before; else what is of its part along q, else that from
-    /// where it comes.
+    /// Moves to a current, in A: what is remembered around it holds; where it has not been, what is of its part along q, else that from
+    /// where it comes, and less further out.
     pub fn at(&mut self, current: Dq, bound_a: f32) {
         let per_a = PER_BOUND / bound_a;
         self.coupled = limit(current.q * per_a, -1.0, 1.0);
+        let (along_d, along_q) = (MIDDLE_D + current.d * per_a, current.q.abs() * per_a);
         // What is below 0 the conversion makes 0.
-        let row = ((MIDDLE_D + current.d * per_a) as usize).min(ALONG_D - 1);
-        let column = ((current.q.abs() * per_a) as usize).min(ALONG_Q - 1);
-        let field = row * ALONG_Q + column;
-        if field != self.field {
-            self.field = field;
-            if let Some(Some(known)) = self.fields.get(field) {
-                self.here = *known;
-            } else if let Some(Some(known)) = self.along_q.get(column) {
-                self.here = *known;
-            }
+        let (row, column) = ((along_d as usize).min(ALONG_D - 2), (along_q as usize).min(ALONG_Q - 2));
+        self.place = Place {
+            point: row * ALONG_Q + column,
+            column,
+            d: limit(along_d - row as f32, 0.0, 1.0),
+            q: limit(along_q - column as f32, 0.0, 1.0),
+        };
+        let between = |point: usize| {
+            let inner = self.known(point, column).unwrap_or(self.here);
+            let outer = self.known(point + 1, column + 1).unwrap_or(inner.times(OUTWARD));
+            inner.towards(outer, self.place.q)
+        };
+        let point = self.place.point;
+        self.here = between(point).towards(between(point + ALONG_Q), self.place.d);
+    }
+
+    /// What is remembered of a point, or of its column.
+    fn known(&self, point: usize, column: usize) -> Option<Matrix> {
+        match self.points.get(point) {
+            Some(Some(known)) => Some(*known),
+            _ => self.along_q.get(column).copied().flatten(),
         }
     }
 
@@ -155,12 +207,29 @@ impl Inductance {
         let most = COUPLING * dd * qq;
         let dq = if dq * dq > most { dq * (most / (dq * dq)) } else { dq };
         self.here = Matrix { dd, dq, qq };
-        if let Some(field) = self.fields.get_mut(self.field) {
-            *field = Some(self.here);
-        }
-        if let Some(column) = self.along_q.get_mut(self.field % ALONG_Q) {
-            *column = Some(self.here);
-        }
+        self.remember(before, Matrix { dd: dd - before.dd, dq: dq - before.dq, qq: qq - before.qq });
+    }
+
+    /// Adds to the four points around what makes so much more here, each by its nearness.
+    fn remember(&mut self, before: Matrix, more: Matrix) {
+        let Place { point, column, d, q } = self.place;
+        let (inner, lower) = (1.0 - q, 1.0 - d);
+        let per = 1.0 / ((inner * inner + q * q) * (lower * lower + d * d));
+        let mut add = |point: usize, outward: usize, share: f32| {
+            let (point, column) = (point + outward, column + outward);
+            let unseen = if outward > 0 { before.times(OUTWARD) } else { before };
+            let known = self.known(point, column).unwrap_or(unseen).with(more, per * share, self.floor_h);
+            if let Some(remembered) = self.points.get_mut(point) {
+                *remembered = Some(known);
+            }
+            if let Some(newest) = self.along_q.get_mut(column) {
+                *newest = Some(known);
+            }
+        };
+        add(point, 0, inner * lower);
+        add(point, 1, q * lower);
+        add(point + ALONG_Q, 0, inner * d);
+        add(point + ALONG_Q, 1, q * d);
     }
 }
 

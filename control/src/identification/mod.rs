@@ -190,13 +190,17 @@ impl ControlLaw for Identification {
         let voltage = committed.volt_seconds.map_or(NONE, |volt_seconds| {
             let interval_s = committed.interval_s;
             let bound_a = law.tables.ratings.max_current_a;
-            self.inductance.at(here, bound_a);
             let left = self.course.drop_v(here, frame) * committed.horizon_s;
-            let ahead = here + self.inductance.current(volt_seconds.park(frame) - left);
-            self.inductance.at(ahead, bound_a);
+            let flux = volt_seconds.park(frame) - left;
+            // The inductance of half of the way there, which the one that was learnt last finds.
+            let about = self.inductance.current(flux);
+            self.inductance.at(here + about * 0.5, bound_a);
+            let ahead = here + self.inductance.current(flux);
             let reach = self.limit_v * interval_s;
             self.course.lasts(interval_s);
             let change = self.course.change(ahead, reach, &mut self.inductance, &law.tables.ratings);
+            // And half of the way that is to come.
+            self.inductance.at(ahead + change * 0.5, bound_a);
             self.voltage(ahead, change, frame, interval_s)
         });
         let (length_v, vector): (f32, AlphaBeta) = (voltage.length(), voltage.unpark(frame));

@@ -21,13 +21,19 @@ pub struct Basis {
     terms: Vec<(usize, usize)>,
 }
 
-/// Chebyshev polynomials up to an order with their first three derivatives.
-fn chebyshev(x: f64, most: usize) -> Vec<[f64; 4]> {
-    let mut all = vec![[1.0, 0.0, 0.0, 0.0], [x, 1.0, 0.0, 0.0]];
+/// Chebyshev polynomials up to an order with their first four derivatives.
+fn chebyshev(x: f64, most: usize) -> Vec<[f64; 5]> {
+    let mut all = vec![[1.0, 0.0, 0.0, 0.0, 0.0], [x, 1.0, 0.0, 0.0, 0.0]];
     for n in 1..most {
-        let ([t, a, b, c], [t0, a0, b0, c0]) = (all[n], all[n - 1]);
+        let ([t, a, b, c, d], [t0, a0, b0, c0, d0]) = (all[n], all[n - 1]);
         let x2 = 2.0 * x;
-        all.push([x2 * t - t0, 2.0 * t + x2 * a - a0, 4.0 * a + x2 * b - b0, 6.0 * b + x2 * c - c0]);
+        all.push([
+            x2 * t - t0,
+            2.0 * t + x2 * a - a0,
+            4.0 * a + x2 * b - b0,
+            6.0 * b + x2 * c - c0,
+            8.0 * c + x2 * d - d0,
+        ]);
     }
     all
 }
@@ -83,7 +89,7 @@ mod tests {
         let basis = Basis::new(100.0);
         let (at, step) = ((-30.0, 20.0), 1e-3);
         let orders =
-            [((0, 0), (1, 0)), ((1, 0), (2, 0)), ((2, 0), (3, 0)), ((0, 1), (0, 2)), ((0, 2), (0, 3))];
+            [((0, 0), (1, 0)), ((1, 0), (2, 0)), ((2, 0), (3, 0)), ((0, 1), (0, 2)), ((0, 2), (0, 3)), ((3, 0), (4, 0)), ((0, 3), (0, 4))];
         for (low, high) in orders {
             let along_d = high.0 > low.0;
             let moved = |by: f64| if along_d { (at.0 + by, at.1) } else { (at.0, at.1 + by) };

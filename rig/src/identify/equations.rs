@@ -16,6 +16,9 @@ const UNSURE_EDGES: f64 = 1.0;
 const UNSURE_EDGES_TURNING: f64 = 3.0;
 /// Shortest part.
 const LEAST_PART: usize = 4;
+/// Weights of the co-energy's derivatives beside a sample's residual, by their order, currents in bounds: how smooth a machine is. The third are the
+/// flux linkage's bends, the fourth their change: iron saturates further where no pulse has been, too.
+const SMOOTHNESS: [(usize, f64); 2] = [(3, 2e-5), (4, 1e-5)];
 /// Currents along d and q at which the map's bends are weighed.
 const GRID: (u32, u32) = (26, 18);
 
@@ -119,15 +122,18 @@ impl Equations {
         self.rows.resize(self.right.len() * self.unknowns, 0.0);
     }
 
-    /// The wish that flux linkages bend little, all over the rectangle: what no sample shows goes on straight.
-    pub fn smooth(&mut self, basis: &Basis, weight: f64) {
-        let weight = weight * (self.samples as f64 / 2.0 / f64::from(GRID.0 * GRID.1)).sqrt();
+    /// The wish that flux linkages bend little, and that their bends change little, all over the rectangle: what no sample shows goes on as it came.
+    pub fn smooth(&mut self, basis: &Basis, bound_a: f64) {
+        let samples = (self.samples as f64 / 2.0 / f64::from(GRID.0 * GRID.1)).sqrt();
         for current in basis.grid(GRID.0, GRID.1) {
-            for (orders, share) in
-                [((3, 0), 1.0), ((2, 1), 3.0_f64.sqrt()), ((1, 2), 3.0_f64.sqrt()), ((0, 3), 1.0)]
-            {
-                let bends = basis.derivative(current, orders);
-                self.add(bends.into_iter().map(|value| weight * share * value), 0.0);
+            for (order, smoothness) in SMOOTHNESS {
+                let weight = smoothness * samples * bound_a.powi(order as i32 - 1);
+                let mut binomial = 1.0_f64;
+                for along_q in 0..=order {
+                    let bends = basis.derivative(current, (order - along_q, along_q));
+                    self.add(bends.into_iter().map(|value| weight * binomial.sqrt() * value), 0.0);
+                    binomial *= (order - along_q) as f64 / (along_q + 1) as f64;
+                }
             }
         }
     }

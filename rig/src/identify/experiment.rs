@@ -15,8 +15,6 @@ use super::spread::BESIDE;
 use anyhow::{Result, ensure};
 use tractive::identification::Observation;
 
-/// Weight of the flux linkage's curvature beside a sample's residual, in squares of the bound: how smooth a machine is.
-const SMOOTHNESS: f64 = 4e-4;
 /// Phase current, as a share of the bound, whose sign is not sure.
 const SMALL_SHARE: f64 = 0.006;
 /// Rounds in which ripple, inductances and the angle's zero find each other: at least, at most, and the change of the zero, in rad, below
@@ -116,7 +114,7 @@ impl Experiment<'_> {
         scope: Scope,
     ) -> Equations {
         let mut equations = Equations::of(boundaries, basis, known, scope);
-        equations.smooth(basis, SMOOTHNESS * self.bound_a * self.bound_a);
+        equations.smooth(basis, self.bound_a);
         equations
     }
 

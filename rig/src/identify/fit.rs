@@ -7,6 +7,9 @@ use super::spread::{BESIDE, Spread};
 use tractive::identification::Stage;
 use tractive_tablegen::FluxMap;
 
+/// Current over the bound up to which the polynomial is the map: ripple goes no further.
+const STRAIGHT_SHARE: f64 = 1.15;
+
 /// A flux linkage at a current, as the turning rotor shows it, and as the pulses do.
 #[derive(Clone, Copy, Debug)]
 pub struct Turning {
@@ -116,13 +119,38 @@ impl Fit {
         (per_s * self.dead_time_s + self.threshold_v, self.spread.error(&shares))
     }
 
+    /// Flux linkages at a current in A, whose co-energy beyond a circle has no more than its first and second derivative outward there: what no
+    /// sample is near has the incremental inductance of the circle. Still one co-energy's gradient: `W' = W + W_r h + W_rr h²/2`, `h = r − r₀`.
+    fn flux_further(&self, current: (f64, f64), from_a: f64) -> (f64, f64) {
+        let r = current.0.hypot(current.1);
+        if r <= from_a {
+            return self.flux(current.0, current.1);
+        }
+        let (h, out) = (r - from_a, (current.0 / r, current.1 / r));
+        let at = (from_a * out.0, from_a * out.1);
+        let of = |orders| self.basis.derivative(at, orders).iter().zip(&self.terms).map(|(a, b)| a * b).sum();
+        let (psi, [dd, dq, qq]) = (self.flux(at.0, at.1), self.inductances(at));
+        let [ddd, ddq, dqq, qqq]: [f64; 4] = [(3, 0), (2, 1), (1, 2), (0, 3)].map(of);
+        let (c, s) = out;
+        // Derivatives outward and around, the latter per rad.
+        let (w_r, w_t) = (psi.0 * c + psi.1 * s, from_a * (psi.1 * c - psi.0 * s));
+        let w_rr = dd * c * c + 2.0 * dq * c * s + qq * s * s;
+        let mixed = dq * (c * c - s * s) + (qq - dd) * c * s;
+        let third = s * (qqq * s * c + dqq * (2.0 * c * c - s * s))
+            + c * (ddq * (c * c - 2.0 * s * s) - ddd * c * s);
+        let (w_rt, w_rrt) = (w_t / from_a + from_a * mixed, 2.0 * mixed + from_a * third);
+        let (along, around) = (w_r + w_rr * h, (w_t + w_rt * h + 0.5 * w_rrt * h * h) / r);
+        (along * c - around * s, along * s + around * c)
+    }
+
     /// The map on a grid that the table generator takes: up to the bound and a little more, along +d a fifth of it.
     pub fn map(&self, bound_a: f64) -> FluxMap {
         const STEPS: i32 = 25;
         let current_a = |step: i32| crate::folder::digits(bound_a * f64::from(step) / f64::from(STEPS));
         let id_a: Vec<f64> = (-STEPS - 2..=5).map(current_a).collect();
         let iq_a: Vec<f64> = (-STEPS - 2..=STEPS + 2).map(current_a).collect();
-        let nodes = id_a.iter().flat_map(|id| iq_a.iter().map(|iq| self.flux(*id, *iq)));
+        let from_a = STRAIGHT_SHARE * bound_a;
+        let nodes = id_a.iter().flat_map(|id| iq_a.iter().map(|iq| self.flux_further((*id, *iq), from_a)));
         let short = crate::folder::digits;
         let (psi_d_wb, psi_q_wb) = nodes.map(|(d, q)| (short(d), short(q))).unzip();
         FluxMap { psi_d_wb, psi_q_wb, id_a, iq_a }
