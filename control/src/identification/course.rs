@@ -202,7 +202,7 @@ impl Course {
         self.zero.turn(back_share, mean.d / bound_a, seen.length_s);
         let drop = self.drop_v(mean, seen.frame);
         let learns = change.squared() > (LEARNT_SHARE * bound_a) * (LEARNT_SHARE * bound_a);
-        if learns && self.stage != Stage::Probe {
+        if learns && !matches!(self.stage, Stage::Probe | Stage::Turn) {
             inductance.learn(change, seen.acted - drop * seen.length_s, NOISE_SHARE * bound_a);
         }
         let [along_d, along_q] = match self.stage {

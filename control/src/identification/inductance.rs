@@ -14,7 +14,11 @@ impl Matrix {
     /// The one that so much of the way lies on to another.
     fn towards(self, other: Self, share: f32) -> Self {
         let between = |from: f32, to: f32| from + share * (to - from);
-        Self { dd: between(self.dd, other.dd), dq: between(self.dq, other.dq), qq: between(self.qq, other.qq) }
+        Self {
+            dd: between(self.dd, other.dd),
+            dq: between(self.dq, other.dq),
+            qq: between(self.qq, other.qq),
+        }
     }
 
     /// This share of it.
@@ -144,9 +148,10 @@ impl Inductance {
             q: limit(along_q - column as f32, 0.0, 1.0),
         };
         let between = |point: usize| {
-            let inner = self.known(point, column).unwrap_or(self.here);
-            let outer = self.known(point + 1, column + 1).unwrap_or(inner.times(OUTWARD));
-            inner.towards(outer, self.place.q)
+            self.known(point, column).map_or(self.here, |inner| {
+                let outer = self.known(point + 1, column + 1).unwrap_or(inner.times(OUTWARD));
+                inner.towards(outer, self.place.q)
+            })
         };
         let point = self.place.point;
         self.here = between(point).towards(between(point + ALONG_Q), self.place.d);

@@ -88,8 +88,15 @@ mod tests {
     fn the_derivatives_are_those_of_the_polynomial() {
         let basis = Basis::new(100.0);
         let (at, step) = ((-30.0, 20.0), 1e-3);
-        let orders =
-            [((0, 0), (1, 0)), ((1, 0), (2, 0)), ((2, 0), (3, 0)), ((0, 1), (0, 2)), ((0, 2), (0, 3)), ((3, 0), (4, 0)), ((0, 3), (0, 4))];
+        let orders = [
+            ((0, 0), (1, 0)),
+            ((1, 0), (2, 0)),
+            ((2, 0), (3, 0)),
+            ((0, 1), (0, 2)),
+            ((0, 2), (0, 3)),
+            ((3, 0), (4, 0)),
+            ((0, 3), (0, 4)),
+        ];
         for (low, high) in orders {
             let along_d = high.0 > low.0;
             let moved = |by: f64| if along_d { (at.0 + by, at.1) } else { (at.0, at.1 + by) };

@@ -18,7 +18,7 @@ const UNSURE_EDGES_TURNING: f64 = 3.0;
 const LEAST_PART: usize = 4;
 /// Weights of the co-energy's derivatives beside a sample's residual, by their order, currents in bounds: how smooth a machine is. The third are the
 /// flux linkage's bends, the fourth their change: iron saturates further where no pulse has been, too.
-const SMOOTHNESS: [(usize, f64); 2] = [(3, 2e-5), (4, 1e-5)];
+const SMOOTHNESS: [(usize, f64); 2] = [(3, 3e-5), (4, 1.5e-5)];
 /// Currents along d and q at which the map's bends are weighed.
 const GRID: (u32, u32) = (26, 18);
 
@@ -122,12 +122,14 @@ impl Equations {
         self.rows.resize(self.right.len() * self.unknowns, 0.0);
     }
 
-    /// The wish that flux linkages bend little, and that their bends change little, all over the rectangle: what no sample shows goes on as it came.
-    pub fn smooth(&mut self, basis: &Basis, bound_a: f64) {
+    /// The wish that flux linkages bend little, and that their bends change little, all over the rectangle: what no sample shows goes on as it came;
+    /// so many times as straight.
+    pub fn smooth(&mut self, basis: &Basis, bound_a: f64, straighter: f64) {
         let samples = (self.samples as f64 / 2.0 / f64::from(GRID.0 * GRID.1)).sqrt();
         for current in basis.grid(GRID.0, GRID.1) {
             for (order, smoothness) in SMOOTHNESS {
-                let weight = smoothness * samples * bound_a.powi(order as i32 - 1);
+                let more = if order == 3 { straighter } else { 1.0 };
+                let weight = more * smoothness * samples * bound_a.powi(order as i32 - 1);
                 let mut binomial = 1.0_f64;
                 for along_q in 0..=order {
                     let bends = basis.derivative(current, (order - along_q, along_q));

@@ -22,6 +22,8 @@ const SMALL_SHARE: f64 = 0.006;
 const LEAST_ROUNDS: u32 = 2;
 const MOST_ROUNDS: u32 = 10;
 const SAME_RAD: f64 = 2e-4;
+/// Straighter maps where no sample is, each tried where the one before bends so that a flux linkage there has more than one current.
+const STRAIGHTER: [f64; 3] = [3.0, 10.0, 30.0];
 /// Largest change of the zero in a round, in rad.
 const MOST_RAD: f64 = 0.1;
 
@@ -33,6 +35,8 @@ struct Experiment<'a> {
     half_s: f64,
     /// `true` if the first half begins with the upper devices on.
     falls: bool,
+    /// So many times as straight is the map where no sample is.
+    straighter: f64,
 }
 
 impl Experiment<'_> {
@@ -114,7 +118,7 @@ impl Experiment<'_> {
         scope: Scope,
     ) -> Equations {
         let mut equations = Equations::of(boundaries, basis, known, scope);
-        equations.smooth(basis, self.bound_a);
+        equations.smooth(basis, self.bound_a, self.straighter);
         equations
     }
 
@@ -161,8 +165,18 @@ impl Experiment<'_> {
 /// Observations that do not tell the machine.
 pub fn fit(observations: &[Observation], bound_a: f64, half_s: f64) -> Result<Fit> {
     // The kind of the first half is not told: the one that explains more is it.
-    let tried = [true, false].map(|falls| Experiment { observations, bound_a, half_s, falls }.fit());
-    let [rising, falling] = tried;
-    let (rising, falling) = (rising?, falling?);
-    Ok(if rising.left_wb() < falling.left_wb() { rising } else { falling })
+    let solved = |straighter: f64| -> Result<Fit> {
+        let [rising, falling] =
+            [true, false].map(|falls| Experiment { observations, bound_a, half_s, falls, straighter }.fit());
+        let (rising, falling) = (rising?, falling?);
+        Ok(if rising.left_wb() < falling.left_wb() { rising } else { falling })
+    };
+    let mut fit = solved(1.0)?;
+    for straighter in STRAIGHTER {
+        if fit.is_invertible(bound_a) {
+            break;
+        }
+        fit = solved(straighter)?;
+    }
+    Ok(fit)
 }

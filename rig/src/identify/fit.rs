@@ -136,11 +136,28 @@ impl Fit {
         let (w_r, w_t) = (psi.0 * c + psi.1 * s, from_a * (psi.1 * c - psi.0 * s));
         let w_rr = dd * c * c + 2.0 * dq * c * s + qq * s * s;
         let mixed = dq * (c * c - s * s) + (qq - dd) * c * s;
-        let third = s * (qqq * s * c + dqq * (2.0 * c * c - s * s))
-            + c * (ddq * (c * c - 2.0 * s * s) - ddd * c * s);
+        let third =
+            s * (qqq * s * c + dqq * (2.0 * c * c - s * s)) + c * (ddq * (c * c - 2.0 * s * s) - ddd * c * s);
         let (w_rt, w_rrt) = (w_t / from_a + from_a * mixed, 2.0 * mixed + from_a * third);
         let (along, around) = (w_r + w_rr * h, (w_t + w_rt * h + 0.5 * w_rrt * h * h) / r);
         (along * c - around * s, along * s + around * c)
+    }
+
+    /// `true` if every flux linkage of the map's cells has one current.
+    pub(super) fn is_invertible(&self, bound_a: f64) -> bool {
+        let map = self.map(bound_a);
+        let columns = map.iq_a.len();
+        let step_a = (map.id_a[1] - map.id_a[0], map.iq_a[1] - map.iq_a[0]);
+        (0..map.id_a.len() - 1).flat_map(|r| (0..columns - 1).map(move |c| r * columns + c)).all(|at| {
+            let along_d = |psi: &[f64]| {
+                (psi[at + columns] - psi[at] + psi[at + columns + 1] - psi[at + 1]) / (2.0 * step_a.0)
+            };
+            let along_q = |psi: &[f64]| {
+                (psi[at + 1] - psi[at] + psi[at + columns + 1] - psi[at + columns]) / (2.0 * step_a.1)
+            };
+            let (dd, qq) = (along_d(&map.psi_d_wb), along_q(&map.psi_q_wb));
+            dd > 0.0 && dd * qq > along_q(&map.psi_d_wb) * along_d(&map.psi_q_wb)
+        })
     }
 
     /// The map on a grid that the table generator takes: up to the bound and a little more, along +d a fifth of it.
