@@ -404,8 +404,18 @@ fn machines_of_other_kinds_are_found_and_driven_with_what_was_found() {
 }
 
 /// Machines as a nameplate tells them: magnets on the surface, much reluctance, 200 W at 24 V, a car's, whose current is fast and whose
-/// iron saturates; 30 W, one pole pair, twelve, reluctance alone at 48 V, and a rotor of a hundred times the usual inertia.
-const NAMEPLATES: [(&str, &str); 9] = [
+/// iron saturates; 30 W, one pole pair, twelve, reluctance alone at 48 V, and a rotor of a hundred times the usual inertia; reluctance alone whose
+/// iron keeps 0.3 of its inductance, and a tram's, whose ripple goes beyond the bound at full torque.
+const NAMEPLATES: [(&str, &str); 11] = [
+    (
+        "much saturation",
+        "--pole-pairs 2 --rs 0.5 --ld 10e-3 --lq 90e-3 --psi-f 0 --saturation 0.3 --max-current 30 --udc 560 --max-speed-rpm 3000 --max-switching-hz 8000",
+    ),
+    (
+        "tram",
+        "--pole-pairs 3 --rs 0.06 --ld 1.2e-3 --lq 2.6e-3 --psi-f 0.45 --saturation 0.6 --max-current 350 --udc 750 --max-speed-rpm 4000 \
+         --max-switching-hz 2000",
+    ),
     (
         "tiny",
         "--pole-pairs 4 --rs 1.2 --ld 1e-3 --lq 1e-3 --psi-f 0.008 --max-current 3 --udc 24 --max-speed-rpm 5000 --max-switching-hz 20000",

@@ -173,3 +173,36 @@ impl Fit {
         FluxMap { psi_d_wb, psi_q_wb, id_a, iq_a }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DMatrix;
+
+    #[test]
+    fn the_map_beyond_the_circle_is_still_one_co_energys_gradient() {
+        let basis = Basis::new(100.0);
+        let terms: Vec<f64> = (0..basis.len()).map(|k| (1.0 + k as f64).sin() / (1.0 + k as f64)).collect();
+        let spread = Spread { factor: DMatrix::zeros(0, 0), lengths: Vec::new(), sigma: 0.0 };
+        let fit = Fit {
+            basis,
+            terms,
+            resistance_ohm: 0.0,
+            dead_time_s: 0.0,
+            threshold_v: 0.0,
+            zero_rad: 0.0,
+            residuals: Vec::new(),
+            still: Vec::new(),
+            turning: Vec::new(),
+            spread,
+        };
+        let (flux, step_a) = (|d: f64, q: f64| fit.flux_further((d, q), 90.0), 1e-4);
+        for (d, q) in [(-80.0, 60.0), (-100.0, 20.0), (-70.0, -95.0), (15.0, 100.0)] {
+            let by_q = (flux(d, q + step_a).0 - flux(d, q - step_a).0) / (2.0 * step_a);
+            let by_d = (flux(d + step_a, q).1 - flux(d - step_a, q).1) / (2.0 * step_a);
+            assert!((by_q - by_d).abs() < 1e-6 * (1.0 + by_q.abs()), "{d}, {q}: {by_q}, {by_d}");
+        }
+        let (within, beyond) = (flux(-53.999, 71.999), flux(-54.001, 72.001));
+        assert!((within.0 - beyond.0).hypot(within.1 - beyond.1) < 1e-3, "{within:?}, {beyond:?}");
+    }
+}
