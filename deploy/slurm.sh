@@ -4,7 +4,7 @@
 #   sbatch --array=0-99 deploy/slurm.sh /shared/out /path/to/tractive-rig campaign --random 1000000
 #
 # The folder and the program are the same for every task. What was cut off is started again with the same line: shards that are
-# done stay. Then: tractive-rig merge /shared/out --out /shared/merged
+# done stay. Then: tractive-rig campaign --merge /shared/out --out /shared/merged
 #SBATCH --job-name=tractive-campaign
 #SBATCH --ntasks=1
 #SBATCH --requeue

@@ -106,5 +106,5 @@ for way in merge whole; do
     fi
     [ $code -le 1 ] || { cat "$folder/$way.txt"; exit 1; }
 done
-cmp "$folder/merged/random.csv" "$folder/whole/random.csv"
-echo "the same $(wc -c < "$folder/whole/random.csv") bytes"
+cmp "$folder/merged/campaign.csv" "$folder/whole/campaign.csv"
+echo "the same $(wc -c < "$folder/whole/campaign.csv") bytes"

@@ -390,6 +390,37 @@ mod tests {
         assert!(down.published.load(Ordering::Relaxed) < 10 && up.sequence.load(Ordering::Relaxed) < 20);
     }
 
+    #[test]
+    fn a_read_is_tried_as_often_as_it_may_be_overtaken() {
+        let mut tries = READ_TRIES;
+        assert_eq!([0; 4].map(|_| overtaken(&mut tries)), [true, true, false, false]);
+    }
+
+    /// A value that reads its own cell while it is written.
+    #[derive(Clone, Copy)]
+    struct Looking(u32);
+
+    static LOOKED_AT: Seqlock<Looking, 1> = Seqlock::new();
+
+    impl Words<1> for Looking {
+        fn to_words(self) -> [u32; 1] {
+            assert!(LOOKED_AT.read().is_none(), "whatever stood there, it is being written");
+            [self.0]
+        }
+
+        fn from_words([word]: [u32; 1]) -> Self {
+            Self(word)
+        }
+    }
+
+    #[test]
+    fn nothing_is_read_while_it_is_written() {
+        for value in 1..4 {
+            LOOKED_AT.publish(Looking(value));
+            assert_eq!(LOOKED_AT.read().map(|looking| looking.0), Some(value));
+        }
+    }
+
     /// Counts around the beginning and around the wrap: a place in a ring depends on the count by its lowest bits, and on the two ends.
     fn counts() -> impl Iterator<Item = u32> {
         (0..100).chain(u32::MAX - 100..=u32::MAX)

@@ -63,7 +63,9 @@ fn currents_to_the_last_bit() {
     }
     assert!(check_currents(&in_phase[3](sum_a + 0.01), RATINGS).is_some());
     assert!(check_currents(&in_phase[3](sum_a - 0.01), RATINGS).is_none());
-    // A current beyond its limit is named before the sum.
+    // A current at its limit is not what is wrong; beyond it, it is named before the sum.
+    let at = Abc { a: trip_a, b: 0.0, c: 0.0 };
+    assert_eq!(check_currents(&at, RATINGS), Some((Fault::PhaseSum, trip_a, sum_a)));
     let both = Abc { a: trip_a.next_up(), b: 0.0, c: 0.0 };
     assert_eq!(check_currents(&both, RATINGS), Some((Fault::Overcurrent, trip_a.next_up(), trip_a)));
 }

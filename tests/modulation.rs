@@ -188,8 +188,8 @@ fn a_mode_is_kept_for_its_dwell_time() {
 }
 
 /// The move of a pattern's flux hexagon while another pattern takes over, in parts of the fundamental flux, and the modes before and
-/// after: at a frequency, from one share of six-step to another.
-fn moved_by_a_switch(hz: f32, before: f32, after: f32) -> (Mode, Mode, f64) {
+/// after: at a frequency, from one share of six-step to another, each with the share that chooses the mode.
+fn moved_by_a_switch(hz: f32, (before, low): (f32, f32), (after, high): (f32, f32)) -> (Mode, Mode, f64) {
     const UDC_V: f32 = 1500.0;
     let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
     let (mut now, mut flux, mut halves) = (Instant(0), [0.0_f64; 2], Vec::<(Mode, _)>::new());
@@ -200,8 +200,7 @@ fn moved_by_a_switch(hz: f32, before: f32, after: f32) -> (Mode, Mode, f64) {
         let turned = Angle((f64::from(rate(hz)) * f64::from(now.0)) as u64 as u32);
         let voltage_v = modulation_index * UDC_V * std::f32::consts::FRAC_2_PI;
         let reference = Reference::turning(voltage_v, turned, rate(hz), now, UDC_V);
-        let beyond = 0.02 * (after - before).signum();
-        let wanted = if number < 200 { before - beyond } else { after + beyond };
+        let wanted = if number < 200 { low } else { high };
         let half = modulator.step(now, Some(&Reference { modulation_index: wanted, ..reference }));
         next = half.ahead[0];
         halves.push((half.mode, flux));
@@ -222,26 +221,25 @@ fn moved_by_a_switch(hz: f32, before: f32, after: f32) -> (Mode, Mode, f64) {
 }
 
 #[test]
-fn a_pattern_that_grows_out_of_another_stands_on_the_same_centre() {
-    let cases = [
-        (Mode::Mid7, Mode::Mid3, [(100.0, 0.86, 0.93), (110.0, 0.88, 0.92), (120.0, 0.8, 0.94)].as_slice()),
-        (
-            Mode::Mid3,
-            Mode::Square,
-            &[(130.0, 0.98, 1.0), (167.0, 0.985, 1.0), (200.0, 0.97, 1.0), (240.0, 0.94, 1.0)],
-        ),
-    ];
-    for (low, high, switches) in cases {
-        for &(hz, below, above) in switches {
-            for (from, to, before, after) in [(low, high, below, above), (high, low, above, below)] {
-                // What square wave is ahead or behind, by half the shortest notch at most, only a longer or shorter edge can catch up with.
-                let caught_up_rad = std::f64::consts::PI * f64::from(hz * MIN_PULSE as f32 / 25e6);
-                let most = 0.002
-                    + if to == Mode::Square { std::f64::consts::FRAC_PI_3 * caught_up_rad } else { 0.0 };
-                let (old, new, moved) = moved_by_a_switch(hz, before, after);
-                assert_eq!((old, new), (from, to), "{hz} Hz");
-                assert!(moved < most, "{hz} Hz, {from:?} {before} to {to:?} {after}: {moved} of {most}");
-            }
+fn a_pattern_that_takes_over_from_another_stands_on_the_same_centre() {
+    let largest = |hz: f32| 1.0 - std::f32::consts::TAU * hz * MIN_PULSE as f32 / 25e6;
+    let mut switches = Vec::new();
+    for (hz, share) in [(100.0, 0.9), (110.0, 0.88), (120.0, 0.6), (119.0, 0.3)] {
+        switches.push((hz, (Mode::Mid7, share), (Mode::Mid3, share), (0.8, 0.95)));
+    }
+    for (hz, share) in [(130.0, 0.98), (167.0, 0.97), (200.0, 0.9), (240.0, 0.8)] {
+        switches.push((hz, (Mode::Mid3, share), (Mode::Square, 1.0), (0.9, 1.02)));
+        // What it will have is not known before: the most that it can.
+        switches.push((hz, (Mode::Mid3, largest(hz)), (Mode::Square, 1.0), (0.9, 1.02)));
+    }
+    for (hz, (low, below), (high, above), (least, most)) in switches {
+        let up = moved_by_a_switch(hz, (below, least), (above, most));
+        let down = moved_by_a_switch(hz, (above, most), (below, least));
+        let down = (high != Mode::Square || below == largest(hz)).then_some((down, high, low));
+        for ((old, new, moved), from, to) in [(up, low, high)].into_iter().chain(down) {
+            println!("{hz} Hz, {from:?} {below} to {to:?} {above}: {moved}");
+            assert_eq!((old, new), (from, to), "{hz} Hz");
+            assert!(moved < 0.0005, "{hz} Hz, {from:?} {below} to {to:?} {above}: {moved}");
         }
     }
 }

@@ -3,6 +3,8 @@
 
 #[path = "pinned/file.rs"]
 mod file;
+#[path = "pinned/options.rs"]
+mod options;
 
 use file::{BASIS, hash, holds};
 use std::fmt::Write;
@@ -14,15 +16,17 @@ use tractive::control::{
 };
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
-use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
+use tractive::machine::{Ratings, Tables};
+use tractive::modulation::{CarrierHalf, Ladder, Mode, Schedule, SwitchLimits};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
 /// Control periods of a walk.
 const PERIODS: u32 = 4_000;
-/// Walks of each law; every other one has a damped link.
-const WALKS: u32 = 8;
+/// Walks of each law; every other one has a damped link, and the last two a machine whose magnets are kept.
+const WALKS: u32 = 10;
+const KEPT: Tables = Tables { ratings: Ratings { min_id_a: -120.0, ..BUILT_IN.ratings }, ..BUILT_IN };
 
 /// Random numbers, the same on every machine.
 struct Random(u64);
@@ -140,15 +144,16 @@ fn pin(sum: u64, numbers: &[f32]) -> u64 {
 fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
     let (clock, mut walk, mut sum) = (Clock::new(25_000_000, 2_500), Walk::new(number), BASIS);
     let gains = Gains::of(number & 2 != 0, number & 1 != 0);
-    let law_of = Law { gains: &gains, clock: &clock, tables: &BUILT_IN };
+    let tables = if number < WALKS - 2 { &BUILT_IN } else { &KEPT };
+    let law_of = Law { gains: &gains, clock: &clock, tables };
     let mut damper = LinkDamper::at(1_500.0);
     for period in 0..PERIODS {
         walk.step(&clock);
         let omega = law.track(walk.angle, &clock);
         let off = Dq { d: 15.0 * walk.random.next(), q: 15.0 * walk.random.next() };
         let current = law.target().current + off;
-        let sample = RotorSample::new(current.unpark(walk.angle.sin_cos()).abc(), walk.angle, &BUILT_IN);
-        law.observe(&sample, &BUILT_IN);
+        let sample = RotorSample::new(current.unpark(walk.angle.sin_cos()).abc(), walk.angle, tables);
+        law.observe(&sample, tables);
         if period % 64 == 0 {
             law.warm(walk.warmth, &law_of);
         }
@@ -161,7 +166,7 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
         }
         if walk.random.is(0.001) {
             law.idle();
-            law.observe(&sample, &BUILT_IN);
+            law.observe(&sample, tables);
         }
         if walk.random.is(0.001) {
             law.begin_without_torque();
@@ -175,6 +180,7 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
                 demand: &demand,
                 window: walk.window.as_ref(),
                 udc_v,
+                change_v: 0.0,
                 link_scale: 1.0,
                 swing,
                 limits: &walk.limits,
@@ -270,12 +276,13 @@ impl PwmPort for Board {
     fn enter(&mut self, _safe: SafeState, _now: Instant) {}
 }
 
-/// Up to full speed and back, torque wandering: every mode comes by.
-fn sweep(number: u32, dead_ticks: u32, out: &mut String) {
+/// Up to full speed and back, torque wandering: every mode of the ladder comes by.
+fn sweep(number: u32, dead_ticks: u32, ladder: Ladder, out: &mut String) {
     let settings = Settings::new(CLOCK, SwitchLimits::new(250, dead_ticks, 900.0, &CLOCK));
     let first = SwitchLimits::new(250, dead_ticks, 900.0, &CLOCK).shortest_half_ticks;
     let shared = Shared::new();
-    let mut control = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
+    let mut control = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks))
+        .scheduled(Schedule::on(ladder, &CLOCK));
     let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(first));
     let (walk, shadow) = (Walk::new(100 + number), CarrierHalf::off(first));
     let mut board = Board { walk, now: 0, shadow, report: Report::default() };
@@ -313,10 +320,24 @@ fn sweep(number: u32, dead_ticks: u32, out: &mut String) {
 fn every_pulse_and_every_report_of_a_sweep_is_as_it_was() {
     let mut out = String::new();
     for (number, dead_ticks) in [(0, 0), (1, 100)] {
-        sweep(number, dead_ticks, &mut out);
+        sweep(number, dead_ticks, Ladder::PAPER, &mut out);
     }
     for mode in ["Async", "Sync", "Square"] {
         assert!(out.contains(mode), "{mode}: {out}");
     }
     holds("sweep", &out);
+}
+
+/// With `--features optimal`.
+#[cfg(feature = "optimal")]
+#[test]
+fn every_pulse_and_every_report_of_a_sweep_of_optimised_patterns_is_as_it_was() {
+    let mut out = String::new();
+    for (number, dead_ticks) in [(0, 0), (1, 100)] {
+        sweep(number, dead_ticks, Ladder::OPTIMAL, &mut out);
+    }
+    for mode in ["Async", "Opt15", "Opt7", "Opt3", "Square"] {
+        assert!(out.contains(mode), "{mode}: {out}");
+    }
+    holds("optimal", &out);
 }

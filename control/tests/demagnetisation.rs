@@ -136,7 +136,15 @@ fn least_of_references<L: ControlLaw>(
         }
         let demand = Demand { torque_nm: wanted_nm, slew_limited: period < 6_000 };
         law.aim(
-            &AimInput { demand: &demand, window: None, udc_v, link_scale: 1.0, swing: None, limits },
+            &AimInput {
+                demand: &demand,
+                window: None,
+                udc_v,
+                change_v: 0.0,
+                link_scale: 1.0,
+                swing: None,
+                limits,
+            },
             &constants,
         );
         let target = law.target();
@@ -216,6 +224,7 @@ fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
             demand: &demand,
             window: None,
             udc_v: 900.0,
+            change_v: 0.0,
             link_scale: 1.0,
             swing: None,
             limits: &limits,

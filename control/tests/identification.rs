@@ -154,6 +154,7 @@ fn run(machine: &str, flux_scale: f64, sensors: Sensors) -> Outcome {
             demand: &demand,
             window: None,
             udc_v: tables.ratings.dc_link_nominal_v,
+            change_v: 0.0,
             link_scale: 1.0,
             swing: None,
             limits: &LIMITS,

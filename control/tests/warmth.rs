@@ -46,6 +46,7 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
                     demand: &demand,
                     window: None,
                     udc_v,
+                    change_v: 0.0,
                     link_scale: 1.0,
                     swing: None,
                     limits: &limits,

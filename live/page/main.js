@@ -21,6 +21,13 @@ const find = name => [...drive.controls.sliders, ...drive.controls.choices, ...d
 const suffix = () => drive.system.motors[motor].suffix;
 const step = () => 1e-3 / +settings.samples;
 
+const runs = [];
+/** Runs a scenario with the rig's words: what its verdicts are, and the SHA-256 of its trace.csv. */
+const run = (name, words = []) => new Promise((done, refused) => {
+  tell({ type: "scenario", id: runs.length, name, words: words.map(String) });
+  runs.push({ done, refused });
+});
+
 function start() {
   const { orders } = drive.controls, held = `rotor${suffix()}`;
   const speed = settings[held] === "held" ? settings[`held${suffix()}`] : memory?.last(`speed${suffix()}`) || 0;
@@ -46,7 +53,7 @@ const act = {
       free: start,
       // An interrupt that has stopped comes again with the processor's restart alone.
       mend: () => { if (injected === "commands-lost") start(); else { tell({ type: "mend" }); order("map"); } injected = ""; },
-      run: () => { $("run").disabled = true; $("sum").textContent = "running …"; delete $("sum").dataset.sha256; tell({ type: "scenario", name: $("scenario").value }); },
+      run: () => { $("run").disabled = true; $("sum").textContent = "running …"; delete $("sum").dataset.sha256; run($("scenario").value).catch(({ message }) => { $("run").disabled = false; $("sum").textContent = message; }); },
     })[id]?.();
     buttons();
   },
@@ -125,10 +132,12 @@ worker.onmessage = ({ data }) => ({
     scope.paused = true;
     [state, factor, fresh] = [{ t: memory.end, trip: null, status: { state: data.name } }, { reached: memory.end / data.seconds, possible: memory.end / data.seconds }, true];
     $("run").disabled = false;
+    runs[data.id].done({ sha256: data.sha256, verdicts: data.verdicts });
     $("sum").dataset.sha256 = data.sha256;
     $("sum").textContent = `trace.csv, ${data.bytes.toLocaleString("en")} bytes, in ${data.seconds.toFixed(1)} s: SHA-256 ${data.sha256}`;
     buttons();
   },
+  refused() { runs[data.id].refused(new Error(data.message)); },
   error() { fault(`<b>The bench has stopped</b> <span>${data.message.replace(/[<&]/g, "")}</span> <span>Restart goes on.</span>`); },
 })[data.type]();
 
@@ -191,7 +200,7 @@ function toolbar() {
   };
   $("csv").onclick = () => save(csv(), "csv");
   $("mcap").onclick = () => save(mcap(memory.columns, saved()), "mcap");
-  globalThis.tractive = { csv, mcap: () => mcap(memory.columns, saved()), faults: properties.faults };
+  globalThis.tractive = { run, csv, mcap: () => mcap(memory.columns, saved()), faults: properties.faults };
   if (remote) for (const id of ["rate-choice"]) $(id).hidden = true;
   $("help").innerHTML = `<h2>Keys</h2><table>${KEYS.map(([keys, text]) => `<tr><td>${keys.split(" ").map(key => `<kbd>${key}</kbd>`).join(" ")}</td><td>${text}</td></tr>`).join("")}</table><form method="dialog"><p><button>Close</button></p></form>`;
   apply();

@@ -37,12 +37,20 @@ const handlers = {
   bound({ motor }) { if (bench) postMessage({ type: "bound", values: bench.bound(motor) }); },
   rate({ value }) { rate = value; owed = 0; },
   drawn() { answered = true; },
-  scenario({ name }) {
+  scenario({ id, name, words }) {
+    const from = performance.now();
+    let ran;
+    try {
+      ran = new Ran(name, words);
+    } catch (error) {
+      postMessage({ type: "refused", id, message: String(error?.message ?? error) });
+      return;
+    }
     bench?.free();
     bench = null;
-    const from = performance.now(), ran = new Ran(name), about = JSON.parse(ran.about()), rows = ran.rows(), edges = ran.edges();
+    const about = JSON.parse(ran.about()), rows = ran.rows(), edges = ran.edges();
     ran.free();
-    postMessage({ type: "ran", name, ...about, rows, edges, seconds: (performance.now() - from) / 1e3 }, [rows.buffer, edges.buffer]);
+    postMessage({ type: "ran", id, name, ...about, rows, edges, seconds: (performance.now() - from) / 1e3 }, [rows.buffer, edges.buffer]);
   },
 };
 

@@ -142,14 +142,14 @@ pub struct Ran {
 
 #[wasm_bindgen]
 impl Ran {
-    /// Runs it.
+    /// Runs it, with words as on the rig's command line.
     #[wasm_bindgen(constructor)]
-    pub fn new(name: &str) -> Result<Ran, JsError> {
-        let scenario::Ran { taken, about } = scenario::run(name).map_err(told)?;
+    pub fn new(name: &str, words: Vec<String>) -> Result<Ran, JsError> {
+        let scenario::Ran { taken, about } = scenario::run(name, &words).map_err(told)?;
         Ok(Ran { taken, about })
     }
 
-    /// SHA-256 and length of its trace.csv, columns and step of its rows, as JSON.
+    /// SHA-256 and length of its trace.csv, columns and step of its rows, and its verdicts, as JSON.
     pub fn about(&self) -> String {
         self.about.to_string()
     }

@@ -46,6 +46,9 @@ pub struct Options {
     /// Processor time that a test may take to be tried at all, in s
     #[arg(long, value_name = "S", default_value_t = 10)]
     longest: u64,
+    /// Try those that no test notices with runs of the rig too, and compare bytes
+    #[arg(long)]
+    bytes: bool,
     /// Threads
     #[arg(long, value_name = "N", default_value_t = 2)]
     jobs: usize,

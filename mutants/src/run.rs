@@ -74,7 +74,7 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     keep_left_out(places, tree, &left_out)?;
     let programs = built?;
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;
-    let trials = learnt(places, &programs, options.longest)?;
+    let trials = learnt(places, &programs, options)?;
     let results = Results::open(&places.work.join("results.jsonl"))?;
     let mut open: Vec<&Mutant> = chosen(&tree.mutants, options)
         .into_iter()
@@ -98,27 +98,35 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     })
 }
 
+/// Limits up to which it is looked for what was learnt, in s.
+const LONGEST_KEPT_S: u64 = 30;
+
 /// The trials of all programs; those of a program that is as it was are read.
-fn learnt(places: &Places, programs: &[Program], longest_s: u64) -> Result<Vec<Trial>> {
+fn learnt(places: &Places, programs: &[Program], options: &Options) -> Result<Vec<Trial>> {
+    let longest_s = options.longest;
     let folder = places.work.join("reached");
     std::fs::create_dir_all(&folder)?;
     let mut all = Vec::new();
     for program in programs {
         let bytes = std::fs::read(&program.path).with_context(|| program.path.display().to_string())?;
-        let mut hasher = DefaultHasher::new();
-        (bytes, longest_s, include_str!("../goldens.txt")).hash(&mut hasher);
-        let file = folder.join(format!("{}-{:016x}.json", program.name.replace(' ', "-"), hasher.finish()));
-        if let Some(trials) =
-            std::fs::read_to_string(&file).ok().and_then(|text| serde_json::from_str(&text).ok())
-        {
-            let trials: Vec<Trial> = trials;
-            all.extend(trials);
+        let mut of_bytes = DefaultHasher::new();
+        bytes.hash(&mut of_bytes);
+        let file = |longest_s: u64| {
+            let mut hasher = of_bytes.clone();
+            (longest_s, include_str!("../goldens.txt")).hash(&mut hasher);
+            folder.join(format!("{}-{:016x}.json", program.name.replace(' ', "-"), hasher.finish()))
+        };
+        // What was learnt of longer ones, too, serves as well.
+        let read = |longest_s| std::fs::read_to_string(file(longest_s)).ok();
+        let known = (longest_s..=LONGEST_KEPT_S).find_map(read);
+        if let Some(trials) = known.and_then(|text| serde_json::from_str::<Vec<Trial>>(&text).ok()) {
+            all.extend(trials.into_iter().filter(|trial| trial.seconds <= longest_s as f64));
             continue;
         }
         let found = match (program.is_test, program.name.ends_with(" tractive-rig")) {
             (true, _) => trials::of(program)?,
-            (false, true) => trials::goldens(program),
-            (false, false) => Vec::new(),
+            (false, true) if options.bytes => trials::goldens(program),
+            (false, _) => continue,
         };
         let count = found.len();
         let learnt: Vec<Trial> = found
@@ -127,7 +135,7 @@ fn learnt(places: &Places, programs: &[Program], longest_s: u64) -> Result<Vec<T
             .filter_map(|trial| trial.learn(&places.work.join("scratch"), longest_s))
             .collect();
         eprintln!("mutants: {}: {} of {count} tests come by a mutant", program.name, learnt.len());
-        std::fs::write(&file, serde_json::to_string(&learnt)?)?;
+        std::fs::write(file(longest_s), serde_json::to_string(&learnt)?)?;
         all.extend(learnt);
     }
     Ok(all)

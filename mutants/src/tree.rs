@@ -135,8 +135,12 @@ pub fn copy(root: &Path, to: &Path, tree: &Tree) -> Result<()> {
         {
             let up = "../".repeat(Path::new(folder).components().count());
             let manifest = String::from_utf8_lossy(&bytes);
-            let dependency = format!("[dependencies]\nmutant = {{ path = \"{up}mutant\" }}\n");
-            bytes = manifest.replacen("[dependencies]\n", &dependency, 1).into_bytes();
+            let depends = |manifest: &str, section: &str| {
+                manifest.replacen(section, &format!("{section}mutant = {{ path = \"{up}mutant\" }}\n"), 1)
+            };
+            // A build script may share files with its package.
+            bytes =
+                depends(&depends(&manifest, "\n[dependencies]\n"), "\n[build-dependencies]\n").into_bytes();
         }
         put(&to.join(file), &bytes)?;
     }

@@ -21,6 +21,8 @@ pub enum Cell {
     Name(&'static str),
     /// A count, or a flag: 0 or 1.
     Count(u32),
+    /// Nothing: the table has no such column.
+    Missing,
 }
 
 impl Cell {
@@ -56,6 +58,7 @@ cells! {
     f32: value => Self::Number(value);
     &'static str: name => Self::Name(name);
     bool: flag => Self::Count(flag.into());
+    Option<f64>: value => value.map_or(Self::Missing, Self::from);
 }
 
 /// Columns by their names with what is in them.
@@ -72,7 +75,7 @@ pub struct Columns<const N: usize>(pub [(&'static str, Cell); N]);
 impl<const N: usize> Serialize for Columns<N> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut row = serializer.serialize_struct("Columns", N)?;
-        for (name, cell) in &self.0 {
+        for (name, cell) in self.0.iter().filter(|(_, cell)| !matches!(cell, Cell::Missing)) {
             row.serialize_field(name, cell)?;
         }
         row.end()

@@ -118,6 +118,9 @@ enum Command {
 struct PatternOptions {
     #[command(flatten)]
     wanted: pattern::Wanted,
+    /// Mode.
+    #[arg(long, value_parser = pattern::names())]
+    mode: String,
     /// The file to write: t_s,leg,level.
     #[arg(long)]
     out: PathBuf,
@@ -172,13 +175,16 @@ fn command(command: Command) -> Result<ExitCode> {
         Command::Commission(options) => commission::command(&options),
         Command::Dbc(options) => done(dbc::run(&options)),
         Command::NineSwitch { input, output } => done(nine_switch::run(&input, &output)),
+        Command::Campaign(options) if !options.merge.is_empty() => {
+            merge::run(&MergeOptions { folders: options.merge, out: options.out, json: options.json })
+        }
         Command::Campaign(options) => campaign::command::run(&options),
         Command::Compare(options) => compare::run(&options),
         Command::Patterns(options) => done(optimised::run(&options)),
         Command::Pattern(options) => {
             let machine = Machine::load(&options.machine)?;
             let max_switching_hz = machine.tables.ratings.max_switching_hz;
-            let wanted = pattern::Wanted { max_switching_hz, ..options.wanted };
+            let wanted = pattern::Wanted { max_switching_hz, ..options.wanted }.with_mode(&options.mode);
             done(pattern::write(&wanted, &options.out))
         }
     }

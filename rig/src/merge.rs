@@ -11,8 +11,9 @@ use std::process::ExitCode;
 /// The options of `merge`.
 #[derive(Args, Clone, Debug)]
 pub struct MergeOptions {
-    /// The folder with the files shard-K-of-N.csv, all of them.
-    pub folder: PathBuf,
+    /// The folders with the files shard-K-of-N.csv, all of them.
+    #[arg(value_name = "DIR", required = true)]
+    pub folders: Vec<PathBuf>,
     /// Folder for the files of the whole.
     #[arg(long, default_value = "target/tractive/merged")]
     pub out: PathBuf,
@@ -23,7 +24,7 @@ pub struct MergeOptions {
 
 /// Merges. Exit code 1 where the whole campaign would have had it; an error where something is missing, there twice, or of another campaign.
 pub fn run(options: &MergeOptions) -> Result<ExitCode> {
-    let merged = shards::merge(&options.folder)?;
+    let merged = shards::merge(&options.folders)?;
     let out = &options.out;
     std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
     let good = match merged.plan.campaign.as_str() {
@@ -34,7 +35,7 @@ pub fn run(options: &MergeOptions) -> Result<ExitCode> {
             points::merged(&merged, out)?;
             true
         }
-        other => bail!("{}: no campaign is named {other}", options.folder.display()),
+        other => bail!("no campaign is named {other}"),
     };
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

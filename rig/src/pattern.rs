@@ -6,7 +6,7 @@ use crate::options::{not_negative, positive};
 use crate::plant::Leg;
 use crate::run::{self, CLOCK, refused};
 use anyhow::{Result, bail};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::PossibleValuesParser;
 use std::path::Path;
 use tractive::frames::{Angle, six_step_v};
 use tractive::modulation::{Mode, Modulator, Reference, Schedule, SwitchLimits, index_limit};
@@ -16,7 +16,7 @@ use tractive::time::{Clock, Instant};
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Wanted {
     /// Mode.
-    #[arg(long, value_parser = modes())]
+    #[arg(skip)]
     pub mode: Mode,
     /// Fundamental, peak phase, in V.
     #[arg(long = "u", id = "u", value_parser = not_negative, allow_negative_numbers = true)]
@@ -41,10 +41,21 @@ pub struct Wanted {
     pub max_switching_hz: f32,
 }
 
-/// The modes with pulses, by their names.
-fn modes() -> impl TypedValueParser<Value = Mode> {
+/// The names of the modes with pulses; `opp7` stands for that of its branches which is played at the modulation index.
+pub fn names() -> PossibleValuesParser {
     let pulsing = Mode::ALL.into_iter().filter(|mode| *mode != Mode::Off);
-    PossibleValuesParser::new(pulsing.map(Mode::name)).map(|name| Mode::named(&name).unwrap_or_default())
+    let mut names: Vec<_> = pulsing.flat_map(|mode| [mode.family(), mode.name()]).collect();
+    let mut seen = std::collections::HashSet::new();
+    names.retain(|name| seen.insert(*name));
+    PossibleValuesParser::new(names)
+}
+
+impl Wanted {
+    /// The same with the mode of this name.
+    pub fn with_mode(self, name: &str) -> Self {
+        let index = self.voltage_v / (self.udc_v * core::f64::consts::FRAC_2_PI);
+        Self { mode: Mode::named_at(name, index as f32).unwrap_or_default(), ..self }
+    }
 }
 
 /// An upper device that changes: time in s, leg 0 ..= 2, on.

@@ -238,14 +238,14 @@ impl Recording {
 }
 
 impl Row {
-    fn columns(&self) -> Columns<16> {
+    fn columns(&self) -> Columns<17> {
         columns! {
             t_s: Cell::time(self.t_s), speed_rpm: self.speed_rpm,
             te_ref_nm: self.te_ref_nm, te_nm: self.te_nm,
             id_ref_a: self.id_ref_a, iq_ref_a: self.iq_ref_a, id_a: self.id_a, iq_a: self.iq_a,
             ia_a: self.ia_a, ib_a: self.ib_a, ic_a: self.ic_a,
             u_v: self.u_v, udc_v: self.udc_v, f1_hz: self.f1_hz,
-            mode: self.mode.name(), fault: name_of(self.trip),
+            mode: self.mode.family(), fault: name_of(self.trip), line_a: self.line_a,
         }
     }
 }

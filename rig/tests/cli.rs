@@ -244,6 +244,26 @@ fn the_pattern_of_every_mode_can_be_had_by_its_name() {
         let wanted = if mode == Mode::Off { 2 } else { 0 };
         assert_eq!(rig(&line(mode.name())).status.code(), Some(wanted), "{}", mode.name());
     }
+    // A number of pulses stands for the branch that the drive plays at this index.
+    for (pulses, branch) in [("opp13", "opp13a"), ("opp9", "opp9a"), ("opp7", "opp7a"), ("opp5", "opp5a")] {
+        let [of_pulses, of_branch] = [pulses, branch].map(|mode| {
+            assert_eq!(rig(&line(mode)).status.code(), Some(0), "{mode}");
+            std::fs::read(&out).unwrap()
+        });
+        assert!(of_pulses == of_branch, "{pulses}");
+    }
+}
+
+#[test]
+fn a_line_filter_adds_its_current_to_the_trace_and_patterns_are_named_by_their_pulses() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "run steady --speed 1600 --torque 1235 --line 3,4,30 --patterns optimal";
+    assert_eq!(rig(&format!("{words} --out {}", folder.path().display())).status.code(), Some(0));
+    let trace = std::fs::read_to_string(folder.path().join("trace.csv")).unwrap();
+    let line_a: Vec<f64> = column(&trace, "line_a").iter().map(|value| value.parse().unwrap()).collect();
+    let mean_a = line_a.iter().sum::<f64>() / line_a.len() as f64;
+    assert!((100.0..200.0).contains(&mean_a), "{mean_a} A of some 207 kW at 1,500 V");
+    assert!(column(&trace, "mode").iter().all(|mode| mode == "opp7"));
 }
 
 #[test]

@@ -8,15 +8,15 @@ use tractive_rig::trace::{Recorded as _, Recording};
 
 /// Speed in r/min, torque in N·m, mode, and the largest distortion in percent and torque ripple in N·m.
 const POINTS: [(f64, f64, &str, f64, f64); 9] = [
-    (700.0, 1235.0, "opt15", 4.8, 130.0),
-    (1000.0, 1235.0, "opt13a", 4.7, 130.0),
-    (1200.0, 1235.0, "opt11", 4.8, 137.0),
-    (1400.0, 1235.0, "opt9b", 4.7, 122.0),
-    (1600.0, 1235.0, "opt7b", 4.2, 97.0),
-    (1700.0, 1235.0, "opt7c", 3.2, 79.0),
-    (1850.0, 1235.0, "opt7e", 2.9, 66.0),
-    (1905.0, 1235.0, "opt7e", 2.5, 60.0),
-    (2700.0, 871.4, "opt3b", 2.8, 76.0),
+    (700.0, 1235.0, "opp15", 4.8, 130.0),
+    (1000.0, 1235.0, "opp13a", 4.7, 130.0),
+    (1200.0, 1235.0, "opp11", 4.8, 137.0),
+    (1400.0, 1235.0, "opp9b", 4.7, 122.0),
+    (1600.0, 1235.0, "opp7b", 4.2, 97.0),
+    (1700.0, 1235.0, "opp7c", 3.2, 79.0),
+    (1850.0, 1235.0, "opp7e", 2.9, 66.0),
+    (1905.0, 1235.0, "opp7e", 2.5, 60.0),
+    (2700.0, 871.4, "opp3b", 2.8, 76.0),
 ];
 
 #[test]
@@ -75,7 +75,7 @@ fn from_eleven_pulses_to_nine() {
     for load in ["--brake --torque-scale 0.15", "--torque-scale 0.33"] {
         let recording = drive(&format!("sweep --to 1300 --udc 1000 {load} --patterns optimal"));
         let switches = analysis::mode_switches(&recording);
-        let of = switches.iter().filter(|switch| switch.from == "opt11" && switch.to.starts_with("opt9"));
+        let of = switches.iter().filter(|switch| switch.from == "opp11" && switch.to.starts_with("opp9"));
         let of: Vec<_> = of.collect();
         assert_eq!(of.len(), 1, "{switches:?}");
         let exact = (of[0].edge_excess_percent, of[0].edge_torque_excursion_nm);

@@ -30,7 +30,8 @@ fn rig(words: impl IntoIterator<Item = String>) -> Output {
 }
 
 fn merge(folder: &Path, out: &Path) -> Output {
-    rig(["merge".into(), folder.display().to_string(), "--out".into(), out.display().to_string()])
+    let [folder, out] = [folder, out].map(|path| path.display().to_string());
+    rig(["campaign".into(), "--merge".into(), folder, "--out".into(), out])
 }
 
 fn good(output: Output) -> String {
@@ -78,18 +79,18 @@ fn merges_alike(campaign: &Campaign, has_whole: bool) {
 
 #[test]
 fn faults_merge_into_the_bytes_of_one_run() {
-    let files = &["cases.csv", "summary.json", "report.html"];
+    let files = &["campaign.csv", "summary.json", "report.html"];
     merges_alike(&Campaign::of("campaign --fast --only link- 850", files), true);
 }
 
 #[test]
 fn random_runs_merge_into_the_bytes_of_one_run() {
-    merges_alike(&Campaign::of("campaign --random 21 --seed 3", &["random.csv"]), true);
+    merges_alike(&Campaign::of("campaign --random 21 --seed 3", &["campaign.csv"]), true);
 }
 
 #[test]
 fn healthy_driving_merges_into_the_same_bytes() {
-    merges_alike(&Campaign::of("campaign --healthy 0.05", &["cycles.csv"]), false);
+    merges_alike(&Campaign::of("campaign --healthy 0.05", &["campaign.csv"]), false);
 }
 
 #[test]
@@ -108,14 +109,14 @@ fn operating_points_merge_into_the_bytes_of_one_run() {
             good(rig(["points".into(), at("in.csv"), parts.clone(), "--shard".into(), shard]));
         }
         let out = at(&format!("merged-{shards}"));
-        good(merge(Path::new(&parts), Path::new(&out)));
+        good(rig(["merge".into(), parts, "--out".into(), out.clone()]));
         assert!(std::fs::read(Path::new(&out).join("points.csv")).unwrap() == whole);
     }
 }
 
 /// A small campaign whose two shards are in a folder.
 fn two_shards(folder: &Path) -> Campaign {
-    let campaign = Campaign::of("campaign --random 6 --seed 5", &["random.csv"]);
+    let campaign = Campaign::of("campaign --random 6 --seed 5", &["campaign.csv"]);
     for shard in 0..2 {
         good(campaign.shard(shard, 2, folder));
     }
@@ -157,13 +158,23 @@ fn a_merge_refuses_gaps_duplicates_and_what_is_of_another_campaign() {
     refuses("nonsense", "is no shard's file");
     std::fs::remove_file(&second).unwrap();
     assert!(refused(merge(&parts, &out)).contains("shard 1/2 is missing"));
+    // Of two folders, one is not enough.
+    let other = folder.path().join("other");
+    good(campaign.shard(1, 2, &other));
+    let of = |folders: &[&Path]| {
+        let folders = folders.iter().map(|path| path.display().to_string());
+        let words = ["campaign".to_owned(), "--merge".to_owned()].into_iter().chain(folders);
+        rig(words.chain(["--out".to_owned(), folder.path().join("of-two").display().to_string()]))
+    };
+    good(of(&[&parts, &other]));
+    assert!(refused(of(&[&other])).contains("shard 0/2 is missing"));
     std::fs::copy(&first, parts.join("shard-again.csv")).unwrap();
     assert!(refused(merge(&parts, &out)).contains("is shard 0/2 again"));
     std::fs::remove_file(parts.join("shard-again.csv")).unwrap();
     good(campaign.shard(1, 2, &parts));
     good(campaign.shard(2, 3, &parts));
     assert!(refused(merge(&parts, &out)).contains("is one of 3 shards"));
-    assert!(!out.join("random.csv").exists());
+    assert!(!out.join("campaign.csv").exists());
 }
 
 #[test]

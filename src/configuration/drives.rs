@@ -42,7 +42,7 @@ impl traction::Settings {
         checked!(clock.check());
         checked!(devices.check(clock));
         checked!(within(&[
-            Bound("angle_late_s", *angle_late_s, 0.0, LATEST_ANGLE_S),
+            Bound("angle_late_s", *angle_late_s, -LATEST_ANGLE_S, LATEST_ANGLE_S),
             Bound("angle_step_rad", *angle_step_rad, 0.0, COARSEST_STEP_RAD),
             Bound(
                 "current_filter_ticks",

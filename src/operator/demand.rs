@@ -312,3 +312,39 @@ pub(super) fn link_lost(input: &Situation, settings: &Settings) -> Option<Failed
 pub(super) fn emf_v(input: &Situation, ratings: &Ratings) -> f32 {
     SQRT_3 * input.observed.emf_omega.abs() * ratings.magnet_flux_wb
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+
+    /// Warmth and limits stay; torque on its way does not.
+    #[test]
+    fn a_demand_that_is_dropped_keeps_its_derating() {
+        let settings = Settings::rated(&BUILT_IN.ratings, 1e-3, None);
+        let warmth = Warmth::new(1.25, -0.05);
+        let mut demand = TorqueDemand { given_nm: 100.0, ..TorqueDemand::AT_REST };
+        demand.derate(0.5, warmth);
+        demand.drop();
+        assert_eq!((demand.given_nm, demand.command(false, 0, &settings).warmth), (0.0, warmth));
+        let most_nm = demand.limits(&settings).motoring_nm;
+        assert_eq!(most_nm, 0.5 * Limits::rated(settings.ratings).motoring_nm);
+    }
+
+    /// The line is what the link was, falls with it, and rises with it while power is taken.
+    #[test]
+    fn the_line_is_known_by_the_link() {
+        let report = |udc_v, omega| Report { udc_v, torque_nm: 100.0, omega, ..Report::default() };
+        let mut line = LineVoltage::UNKNOWN;
+        for (udc_v, omega, wanted_v) in [
+            (1_500.0, 0.0, 1_500.0),
+            (1_800.0, -50.0, 1_500.0),
+            (1_800.0, 0.0, 1_500.0),
+            (1_800.0, 50.0, 1_600.0),
+            (1_300.0, -50.0, 1_500.0),
+        ] {
+            line.step(&report(udc_v, omega), 1.0);
+            assert!((line.0 - wanted_v).abs() < 1e-2, "{udc_v} V: {}, not {wanted_v}", line.0);
+        }
+    }
+}

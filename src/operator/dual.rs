@@ -279,3 +279,38 @@ impl Demands for DualDemands {
 fn larger(a: f32, b: f32) -> f32 {
     if a > b || a.is_nan() { a } else { b }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::zs9::BUILT_IN;
+    use crate::protection::{Fault, SafeState};
+    use crate::time::Instant;
+
+    #[test]
+    fn the_quicker_motor_and_both_emfs_are_seen() {
+        let report = DualReport { omega: [3.0, -4.0], current_a: [7.0, 5.0], ..DualReport::default() };
+        let seen = DualDemands::seen(&Observation { at: Instant(9), report });
+        assert_eq!((seen.at, seen.omega, seen.emf_omega, seen.current_a), (Instant(9), 4.0, 7.0, 7.0));
+        let trip = Trip {
+            fault: Fault::Configuration,
+            value: 2.0,
+            limit: 1.0,
+            at: Instant(3),
+            safe: SafeState::GatesOff,
+        };
+        assert_eq!(DualDemands::refused(trip).trip, Some(trip));
+    }
+
+    #[test]
+    fn either_motor_asks_for_torque() {
+        let idle = DualRequest::idle(&BUILT_IN.ratings, 600.0);
+        assert!(!DualDemands::asks_torque(&idle));
+        for (motor, wanted) in [(0, Wanted::Torque(1.0)), (1, Wanted::Torque(-1.0)), (1, Wanted::Speed(20.0))]
+        {
+            let mut request = idle;
+            request.motors[motor].wanted = wanted;
+            assert!(DualDemands::asks_torque(&request), "{motor} {wanted:?}");
+        }
+    }
+}

@@ -250,4 +250,41 @@ mod tests {
             assert_eq!(motoring_share(udc_v, &ratings), 1.0, "{lowest} {udc_v}");
         }
     }
+
+    /// At once where nothing is known, then with its time constant.
+    #[test]
+    fn what_is_drawn_follows_link_loss_and_speed() {
+        let settings = Settings::rated(&BUILT_IN.ratings, 1e-3, None);
+        let ratings = settings.ratings;
+        let report = |udc_v, torque_nm, mechanical: f32| {
+            let (id_a, iq_a, omega) = (-30.0, 40.0, mechanical * ratings.pole_pairs);
+            Report { udc_v, torque_nm, id_a, iq_a, omega, ..Report::default() }
+        };
+        let copper_w = 1.5 * ratings.stator_resistance_ohm * 2_500.0;
+        let near = |got: f32, wanted: f32| assert!((got / wanted - 1.0).abs() < 1e-5, "{got}, not {wanted}");
+        let mut drawn = Drawn::UNKNOWN;
+        drawn.step(&report(1_500.0, 400.0, 50.0), &settings);
+        near(drawn.udc_v, 1_500.0);
+        near(drawn.loss, copper_w / 160e3);
+        near(drawn.speed, 50.0);
+        let share = 1.0 / 51.0;
+        drawn.step(&report(1_400.0, -300.0, 60.0), &settings);
+        near(drawn.udc_v, 1_500.0 - 100.0 * share);
+        near(drawn.loss, copper_w / 160e3 + share * (copper_w / 90e3 - copper_w / 160e3));
+        near(drawn.speed, 50.0 + 10.0 * share);
+        // Of little torque as of a tenth of the largest.
+        let mut idle = Drawn::UNKNOWN;
+        idle.step(&report(1_500.0, 1.0, 0.0), &settings);
+        let least_nm = 0.1 * ratings.max_torque_nm;
+        near(idle.loss, copper_w / (least_nm * least_nm));
+    }
+
+    #[test]
+    fn limits_come_back_from_their_words() {
+        use crate::cell::Words;
+        let words = [1.0_f32, 2.0, 3.0, 4.0, 5.0].map(f32::to_bits);
+        let limits = TrainLimits::from_words(words);
+        assert_eq!((limits.motoring_a, limits.braking_w, limits.acceleration_rad_s2), (1.0, 4.0, 5.0));
+        assert_eq!(limits.to_words(), words);
+    }
 }

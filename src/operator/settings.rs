@@ -136,3 +136,59 @@ impl<'a> Settings<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+
+    /// 200 V below the lowest operating voltage it trips, and 400 V above the highest one.
+    const RATINGS: Ratings = Ratings {
+        dc_link_min_v: 1_000.0,
+        dc_link_max_v: 1_800.0,
+        trip_dc_under_v: 800.0,
+        trip_dc_over_v: 2_200.0,
+        torque_slew_nm_s: 5_000.0,
+        ..BUILT_IN.ratings
+    };
+
+    fn near(got: f32, wanted: f32) {
+        assert!((got / wanted - 1.0).abs() < 1e-6, "{got}, not {wanted}");
+    }
+
+    #[test]
+    fn levels_lie_at_their_places_between_operation_and_trip() {
+        let ends = Ends::rated(&RATINGS);
+        near(ends.motoring_none_v, 900.0);
+        near(ends.motoring_span_v, 100.0);
+        near(ends.braking_none_v, 2_040.0);
+        near(ends.braking_span_v, 120.0);
+        let line = Line::rated(&RATINGS, 0.3, 40.0);
+        assert_eq!((line.precharge_s, line.discharge_s, line.contactor_s), (0.3, 40.0, 0.2));
+        near(line.chopper_from_v, 1_820.0);
+        near(line.chopper_full_v, 1_900.0);
+        let without = line.without_chopper();
+        assert_eq!((without.chopper_from_v, without.chopper_full_v), (f32::INFINITY, f32::INFINITY));
+        assert_eq!((without.precharge_s, without.empty_v), (0.3, line.empty_v));
+    }
+
+    /// Extra-low voltage, but no more than a fifth of the lowest voltage in operation.
+    #[test]
+    fn a_link_counts_as_empty_below_extra_low_voltage() {
+        for (dc_link_min_v, empty_v) in [(1_000.0, 60.0), (300.0, 60.0), (250.0, 50.0), (40.0, 8.0)] {
+            near(Line::rated(&Ratings { dc_link_min_v, ..RATINGS }, 0.3, 40.0).empty_v, empty_v);
+        }
+    }
+
+    #[test]
+    fn the_operator_slews_slower_than_the_drive() {
+        let settings = Settings::rated(&RATINGS, 1e-3, None);
+        near(settings.slew_nm_s, 4_000.0);
+        near(settings.jerk_nm_s2, 80_000.0);
+        assert_eq!(
+            (settings.slot_s, settings.line.is_none(), settings.thermal.is_none()),
+            (1e-3, true, true)
+        );
+        assert_eq!(settings.train, TrainLimits::NONE);
+    }
+}

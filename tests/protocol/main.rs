@@ -11,6 +11,7 @@ mod dbc;
 mod document;
 mod e2e;
 mod fuzz;
+mod message_sets;
 mod receiver;
 mod scales;
 mod session;

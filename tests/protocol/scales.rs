@@ -303,3 +303,62 @@ fn measurements_come_through() {
     near(found.voltage_v, sent.voltage_v, 0.01);
     near(found.frequency_hz, sent.frequency_hz, 0.05);
 }
+
+/// Each exponent on either side of the rating at which it changes.
+#[test]
+fn a_scale_changes_where_steps_or_room_run_out() {
+    type Change = fn(&mut Ratings, f32);
+    let fast_poles: Change = |ratings, speed| (ratings.pole_pairs, ratings.trip_speed_rad_s) = (10.0, speed);
+    let few_poles: Change = |ratings, speed| (ratings.pole_pairs, ratings.trip_speed_rad_s) = (1.0, speed);
+    let quick = 1e3 / tractive::protocol::RPM_PER_RAD_S;
+    let cases: [(Quantity, Change, [f32; 2], [i32; 2]); 9] = [
+        (Quantity::Torque, |ratings, torque| ratings.max_torque_nm = torque, [49.9, 50.0], [-1, 0]),
+        (Quantity::Torque, |ratings, torque| ratings.max_torque_nm = torque, [2_000.0, 2_000.1], [0, 1]),
+        (Quantity::Current, |ratings, current| ratings.max_current_a = current, [49.9, 50.0], [-1, 0]),
+        (Quantity::Current, |ratings, current| ratings.trip_current_a = current, [3_000.0, 3_000.1], [0, 1]),
+        (Quantity::Voltage, |ratings, link| ratings.dc_link_nominal_v = link, [49.9, 50.0], [-1, 0]),
+        (Quantity::Voltage, |ratings, link| ratings.trip_dc_over_v = link, [6_500.0, 6_500.1], [0, 1]),
+        (
+            Quantity::Speed,
+            |ratings, speed| ratings.max_speed_rad_s = speed,
+            [0.249 * quick, 0.251 * quick],
+            [-1, 0],
+        ),
+        // 16,000 r/min, and 1,600 Hz.
+        (Quantity::Speed, few_poles, [15.99 * quick, 16.01 * quick], [0, 1]),
+        (Quantity::Speed, fast_poles, [9.599 * quick, 9.601 * quick], [0, 1]),
+    ];
+    for (quantity, change, ratings_at, exponents) in cases {
+        let told = ratings_at.map(|value| {
+            let (trip_current_a, trip_dc_over_v, trip_speed_rad_s) = (100.0, 100.0, 0.2 * quick);
+            let mut ratings =
+                Ratings { trip_current_a, trip_dc_over_v, trip_speed_rad_s, ..BUILT_IN.ratings };
+            change(&mut ratings, value);
+            Scales::of(&ratings).exponent(quantity)
+        });
+        assert_eq!(told, exponents, "{quantity:?} at {ratings_at:?}");
+    }
+    let zs9 = |dc_link_max_v: f32| {
+        let ratings = Ratings { dc_link_max_v, ..BUILT_IN.ratings };
+        Scales::of_zs9(&ratings).exponent(Quantity::Voltage)
+    };
+    assert_eq!([zs9(4_333.0), zs9(4_334.0)], [0, 1], "1.5 times that is 6,500 V");
+}
+
+/// Raw zero is the offset, and counts from there.
+#[test]
+fn a_signal_may_count_from_an_offset() {
+    let signal = Signal { offset: 40.0, ..Signal::physical("t", "°C", 8, 0.5, [-10.0, 90.0]) };
+    for (value, raw) in [(40.0, 0_u16), (45.0, 10), (39.5, 0xFFFF), (90.0, 100), (-10.0, 0xFF9C)] {
+        let mut payload = Payload(0);
+        signal.put(&mut payload, value).unwrap();
+        assert_eq!(signal.raw(payload), raw.into(), "{value}");
+        assert_eq!(signal.get(payload), Some(value));
+    }
+    let beyond = [101_u32, 0xFF9B].map(|raw| {
+        let mut payload = Payload(0);
+        signal.put_raw(&mut payload, raw);
+        signal.get(payload)
+    });
+    assert_eq!(beyond, [None, None]);
+}

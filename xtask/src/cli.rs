@@ -159,15 +159,15 @@ pub struct LiveArgs {
     pub no_open: bool,
     /// Make the folder, and serve nothing
     #[arg(long, conflicts_with_all = ["port", "no_open"])]
-    pub no_serve: bool,
+    pub build_only: bool,
     /// Serve the page of the image in QEMU instead, with the options of `rig live` behind `--`
-    #[arg(long, conflicts_with_all = ["out", "port", "no_open", "no_serve"])]
+    #[arg(long, conflicts_with_all = ["out", "port", "no_open", "build_only"])]
     pub in_qemu: bool,
     /// Options of `rig live`
     #[arg(last = true, value_name = "OPTIONS", requires = "in_qemu")]
     pub words: Vec<OsString>,
     /// Take the guide's pictures into this folder instead
-    #[arg(long, value_name = "DIR", conflicts_with = "no_serve")]
+    #[arg(long, value_name = "DIR", conflicts_with = "build_only")]
     pub screenshots: Option<PathBuf>,
 }
 

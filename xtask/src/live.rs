@@ -32,7 +32,7 @@ pub fn run(args: &LiveArgs) -> Result<u8> {
         let taken = succeeds(live.arg("--browser").arg(&browser))?;
         return Ok(u8::from(!(taken && succeeds(report.arg("--browser").arg(&browser))?)));
     }
-    if args.no_serve {
+    if args.build_only {
         return Ok(0);
     }
     let mut serve = tool();

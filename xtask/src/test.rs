@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
 /// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the
 /// first.
-const TOGETHER: [&[&str]; 4] = [
+const TOGETHER: [&[&str]; 6] = [
     &[
         "tractive",
         "tractive-control",
@@ -28,13 +28,20 @@ const TOGETHER: [&[&str]; 4] = [
         "tractive-mutants",
     ],
     &[CONTROL],
+    &[DRIVE],
+    &[TABLEGEN],
     &[RIG],
     &[OWN],
 ];
 
-/// The unit tests of the optimised patterns, which no other command builds in: the rig has them in its dependencies alone.
+/// The tests of the optimised patterns, which no other command builds in: the rig has them in its dependencies alone.
 const CONTROL: &str = "tractive-control";
-const CONTROL_PARTS: [&[&str]; 1] = [&["--lib", "--features", "optimal", "modulation"]];
+const CONTROL_PARTS: [&[&str]; 2] =
+    [&["--lib", "--features", "optimal", "modulation"], &["--test", "pulses", "--features", "optimal"]];
+const TABLEGEN: &str = "tractive-tablegen";
+const TABLEGEN_PARTS: [&[&str]; 1] = [&["--test", "patterns", "--test", "values", "--features", "patterns"]];
+const DRIVE: &str = "tractive";
+const DRIVE_PARTS: [&[&str]; 1] = [&["--test", "pinned", "--features", "optimal"]];
 
 /// The rig, and the parts that it is tested in. Its own unit tests take a second, but all of it compiled once more: that is done without
 /// optimisation. The others take the library that `cargo rig` runs.
@@ -165,6 +172,8 @@ fn host(packages: &[String]) -> Result<bool> {
     let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
     let parts: &[&[&str]] = match packages {
         [package] if package == CONTROL => &CONTROL_PARTS,
+        [package] if package == TABLEGEN => &TABLEGEN_PARTS,
+        [package] if package == DRIVE => &DRIVE_PARTS,
         [package] if package == RIG => &RIG_PARTS,
         [package] if package == OWN => &OWN_PARTS,
         _ => &[&[]],
@@ -342,10 +351,12 @@ mod tests {
         let metadata: serde_json::Value = serde_json::from_slice(&metadata.stdout).unwrap();
         let packages = metadata["packages"].as_array().unwrap();
         let mut there: Vec<_> = packages.iter().map(|package| package["name"].as_str().unwrap()).collect();
-        // The control crate has a part more, with its optimised patterns.
-        let (once_more, groups): (Vec<_>, Vec<_>) =
-            together().unwrap().into_iter().partition(|packages| *packages == [CONTROL]);
-        assert_eq!(once_more.len(), 1);
+        // Some have a part more, with the optimised patterns.
+        let (once_more, groups): (Vec<_>, Vec<_>) = together()
+            .unwrap()
+            .into_iter()
+            .partition(|packages| matches!(&packages[..], [package] if [CONTROL, DRIVE, TABLEGEN].contains(&package.as_str())));
+        assert_eq!(once_more.len(), 3);
         let mut tested = groups.concat();
         // Step `twin` tests it, where there is cmake.
         tested.push(twin::PACKAGE.to_owned());

@@ -452,7 +452,7 @@ impl<'a> Stage<'a> {
         let (threshold_v, slope_mohm) =
             (device_threshold_v.unwrap_or_default(), device_slope_mohm.unwrap_or_default());
         self.check(&[
-            Bound("angle_late_us", late_us, 0.0, most_us, "made up for by the speed"),
+            Bound("angle_late_us", late_us, -500.0, most_us, "made up for by the speed"),
             Bound("current_filter_us", filter_us, 0.0, most_filter_us, as_delay),
             Bound("device_threshold_v", threshold_v, 0.0, 20.0, "of a device"),
             Bound("device_slope_mohm", slope_mohm, 0.0, 150.0, "of a device"),

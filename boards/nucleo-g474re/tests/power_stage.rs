@@ -87,7 +87,7 @@ fn every_key_is_refused_by_name_and_line() {
         for (key, value) in keys {
             let nonsense: &[&str] = match value {
                 toml::Value::Integer(_) => &["0", "4294967295", "-1", "1.5"],
-                toml::Value::Float(_) if key == "angle_late_us" => &["nan", "inf", "-1.0", "501.0"],
+                toml::Value::Float(_) if key == "angle_late_us" => &["nan", "inf", "-501.0", "501.0"],
                 toml::Value::Float(_) => &["0.0", "nan", "inf", "-1.0", "1e9"],
                 _ => &["[]", "[nan]", "[nan, 0.0]", "[0.0, 1e9]", "[0.0, 0.0, 0.0]"],
             };
@@ -171,7 +171,7 @@ fn another_position_sensor_takes_the_encoders_place() {
     assert!(sensor(&quick).unwrap_err().contains("control_hz: 25000: must be from 0 to 22000"));
     let late = ABSOLUTE.replace("angle_late_us = 0.0", "angle_late_us = 401.0");
     let said = TRACTION.check(&late, TRACTION.tables).unwrap_err();
-    assert!(said.contains("angle_late_us: 401: must be from 0 to 400"), "{said}");
+    assert!(said.contains("angle_late_us: 401: must be from -500 to 400"), "{said}");
     let table = |text: &'static str| text.split_once("\n[").map(|(_, table)| format!("\n[{table}")).unwrap();
     for both in [TRACTION.text.to_owned() + &table(ABSOLUTE), ABSOLUTE.to_owned() + &table(RESOLVER)] {
         let said = sensor(&both).unwrap_err();

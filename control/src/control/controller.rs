@@ -60,6 +60,8 @@ pub struct AimInput<'a> {
     pub window: Option<&'a LinkWindow>,
     /// DC-link voltage as it is read, in V.
     pub udc_v: f32,
+    /// By how much the link is expected to be above that where the voltage will act, in V.
+    pub change_v: f32,
     /// The link's voltage over that, as far as the drive makes use of [`ControlLaw::link_scale`] for its volt-seconds; 1: it makes none.
     pub link_scale: f32,
     /// The link's swing, where it is to be damped.
@@ -201,7 +203,7 @@ impl ControlLaw for Controller {
     }
 
     fn aim(&mut self, input: &AimInput, law: &Law) {
-        let AimInput { demand, window, udc_v, link_scale, swing, limits } = *input;
+        let AimInput { demand, window, udc_v, change_v, link_scale, swing, limits } = *input;
         let (tables, ratings, omega) = (law.tables, &law.tables.ratings, self.speed.omega());
         let Scales { torque, flux } = self.map_error.scales();
         let map_nm = self.sum_nm / self.samples as f32;
@@ -214,7 +216,7 @@ impl ControlLaw for Controller {
         let shaping =
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
         let demand_nm = self.demand.step(&shaping, ratings);
-        let link = self.link.step(udc_v * link_scale, period_s);
+        let link = self.link.step(udc_v * link_scale, change_v * link_scale, period_s);
         let most = limits.index_limit * limits.steady_share;
         let limit = VoltageLimit { udc_v: link.slow_v / flux, modulation_index: most, filled: limits.filled };
         let trim_nm = self.trim.trim_nm(demand_nm, limits.ripple_share, ratings.max_torque_nm);

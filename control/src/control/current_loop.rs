@@ -187,7 +187,6 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
     let steady = reference.j() * input.omega + resistive;
     let limit = input.target.voltage_limit_v;
     let towards = |gain: f32| {
-        let gain = if input.limits.settled { gain } else { 0.0 };
         let steady = steady - input.disturbance.mean();
         (steady - (input.ahead.flux - reference) * gain, steady, limit)
     };

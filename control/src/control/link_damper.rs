@@ -66,3 +66,25 @@ impl LinkDamper {
         LinkSwing { share: self.share, per_slow_v }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn torque_follows_the_swing_of_a_motoring_drive_within_none_and_the_largest() {
+        for (share, torque_nm, omega, more_nm) in [
+            (0.01, 200.0, 50.0, 4.0),
+            (-0.01, 200.0, 50.0, -4.0),
+            (0.01, -200.0, -50.0, 4.0),
+            (0.01, -200.0, 50.0, 0.0),
+            (0.01, 200.0, 0.0, 0.0),
+            (-0.9, 200.0, 50.0, -200.0),
+            (0.9, 200.0, 50.0, 100.0),
+        ] {
+            let swing = LinkSwing { share, per_slow_v: 1e-3 };
+            let got_nm = swing.damping_nm(2.0, torque_nm, omega, 300.0);
+            assert!((got_nm - more_nm).abs() < 1e-4, "{share} {torque_nm} {omega}: {got_nm}");
+        }
+    }
+}

@@ -38,9 +38,9 @@ impl LinkFilter {
         Self { slow_v: None, jump: JUMPED.0, lowest_v: f32::MAX }
     }
 
-    /// One control period, with the link as it is measured.
+    /// One control period, with the link as it is measured and by how much it will be above that where a voltage acts, in V.
     #[inline(never)]
-    pub fn step(&mut self, udc_v: f32, period_s: f32) -> Link {
+    pub fn step(&mut self, udc_v: f32, change_v: f32, period_s: f32) -> Link {
         let before = self.slow_v.unwrap_or(udc_v);
         let slow_v = before + LINK_RAD_S * period_s * (udc_v - before);
         self.slow_v = Some(slow_v);
@@ -49,7 +49,7 @@ impl LinkFilter {
         let (from, until) = JUMPED;
         let jumped = udc_v > self.jump * slow_v;
         self.jump = if jumped { until } else { from };
-        Link { slow_v, usable_v: if jumped { slow_v } else { udc_v } }
+        Link { slow_v, usable_v: if jumped { slow_v } else { udc_v + change_v } }
     }
 
     /// The lowest link without its ripple, in V; left slowly.

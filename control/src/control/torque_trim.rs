@@ -119,4 +119,32 @@ mod tests {
         assert!(learned_nm(910.0, true, false) < -10.0, "less is possible");
         assert_eq!(learned_nm(910.0, true, true), 0.0, "crests of the ripple");
     }
+
+    /// A demand that changes by more than the largest torque in a second is one after which the loop is still at work.
+    #[test]
+    fn a_steep_ramp_teaches_nothing() {
+        for (largest_nm, slope_nm_s, learns) in
+            [(1_000.0, 990.0, true), (1_000.0, 1_010.0, false), (2.0, 1.9, true), (2.0, 2.1, false)]
+        {
+            let (mut trim, period_s) = (TorqueTrim::new(), 1e-3);
+            for period in 0..200_u8 {
+                let demand_nm = slope_nm_s * period_s * f32::from(period);
+                let measured_nm = 0.99 * demand_nm;
+                trim.step(&Input {
+                    demand_nm,
+                    measured_nm,
+                    limited: false,
+                    short: false,
+                    ripple_share: RIPPLE_SHARE,
+                    largest_nm,
+                    period_s,
+                });
+            }
+            assert_eq!(
+                trim.trim_nm(largest_nm, RIPPLE_SHARE, largest_nm) > 0.0,
+                learns,
+                "{largest_nm} {slope_nm_s}"
+            );
+        }
+    }
 }

@@ -5,8 +5,8 @@
 //! it lasts all three phases are at one level and the voltage is zero. A notch spans both halves of its carrier,
 //! and each half sets its own part anew.
 
-use super::{CarrierHalf, Mode, SwitchLimits};
-use crate::frames::{limit, six_step_v};
+use super::{CarrierHalf, Mode, Reference, SwitchLimits};
+use crate::frames::{UNITS_PER_RADIAN, limit, six_step_v};
 
 /// Share of six-step from which square wave needs no notch.
 const WHOLE: f32 = 0.99;
@@ -26,6 +26,17 @@ pub fn zero_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
         return 0.0;
     }
     half_notch_rad(mode, voltage_v, udc_v) * mode.notches() as f32
+}
+
+/// Half the zero voltage of a sector that a mode will have, as an angle in rad: that of its shortest notches, or more.
+#[inline(never)]
+pub fn least_zero_rad(mode: Mode, seen: &Reference, devices: &SwitchLimits) -> f32 {
+    if mode.is_whole() {
+        return 0.0;
+    }
+    let least_rad = seen.rate * (0.5 / UNITS_PER_RADIAN) * (devices.min_pulse_ticks * mode.notches()) as f32;
+    let zero_rad = zero_rad(mode, seen.voltage_v, seen.udc_v);
+    if zero_rad > least_rad { zero_rad } else { least_rad }
 }
 
 /// asin on 0 ..= 0.5, error below 2e-7 rad (the notch is at most 60° wide, its half 30°).

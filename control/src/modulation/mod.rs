@@ -103,7 +103,6 @@ mod mode;
 mod modulator;
 #[cfg(feature = "optimal")]
 mod optimal;
-mod pattern_transition;
 mod reference;
 mod ripple;
 mod schedule;
@@ -115,7 +114,6 @@ pub use mode::{MODE_CODES, Mode, Regulation};
 pub use modulator::Modulator;
 #[cfg(feature = "optimal")]
 pub use optimal::ripple as optimal_ripple;
-pub use pattern_transition::TRANSITION_SECTORS;
 pub use reference::Reference;
 pub use ripple::{RippleFlux, ripple_share};
 pub use schedule::{Ladder, Schedule, first_half, index_limit};

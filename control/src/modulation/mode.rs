@@ -201,37 +201,37 @@ modes! {
     Mid5: Row::middle60("mid5", 2, 3.863_703, [0.0, 0.13], Border::new((176.0, 171.0), (0.955, 0.935)));
     @optimal {
         /// Optimised, 15 pulses.
-        Opt15: "opt15", OPT15, Border::new((59.5, 57.0), (0.57, 0.55));
+        Opp15: "opp15", OPP15, Border::new((59.5, 57.0), (0.57, 0.55));
         /// Optimised, 13 pulses, at a small modulation index.
-        Opt13a: "opt13a", OPT13A, Border::new((68.5, 66.0), (0.635, 0.622));
+        Opp13a: "opp13a", OPP13A, Border::new((68.5, 66.0), (0.635, 0.622));
         /// Optimised, 13 pulses, at a larger one.
-        Opt13b: "opt13b", OPT13B, Border::new((68.5, 66.0), (0.78, 0.76));
+        Opp13b: "opp13b", OPP13B, Border::new((68.5, 66.0), (0.78, 0.76));
         /// Optimised, 11 pulses.
-        Opt11: "opt11", OPT11, Border::new((81.0, 78.5), (0.725, 0.705));
+        Opp11: "opp11", OPP11, Border::new((81.0, 78.5), (0.725, 0.705));
         /// Optimised, 9 pulses, at a small modulation index.
-        Opt9a: "opt9a", OPT9A, Border::new((99.0, 96.0), (0.535, 0.52));
+        Opp9a: "opp9a", OPP9A, Border::new((99.0, 96.0), (0.535, 0.52));
         /// Optimised, 9 pulses, at a larger one.
-        Opt9b: "opt9b", OPT9B, Border::new((99.0, 96.0), (0.81, 0.79));
+        Opp9b: "opp9b", OPP9B, Border::new((99.0, 96.0), (0.81, 0.79));
         /// Optimised, 7 pulses, at a small modulation index.
-        Opt7a: "opt7a", OPT7A, Border::new((129.3, 128.4), (0.675, 0.66));
+        Opp7a: "opp7a", OPP7A, Border::new((129.3, 128.4), (0.675, 0.66));
         /// Optimised, 7 pulses, at a medium one.
-        Opt7b: "opt7b", OPT7B, Border::new((129.3, 128.4), (0.882, 0.867));
+        Opp7b: "opp7b", OPP7B, Border::new((129.3, 128.4), (0.882, 0.867));
         /// Optimised, 7 pulses, at a large one.
-        Opt7c: "opt7c", OPT7C, Border::new((129.3, 128.4), (0.945, 0.94));
+        Opp7c: "opp7c", OPP7C, Border::new((129.3, 128.4), (0.945, 0.94));
         /// Optimised, 7 pulses, near six-step. The free carrier's share of the switching frequency makes 128.0 Hz of these 129.3.
-        Opt7d: "opt7d", OPT7D, Border::new((129.3, 128.4), (0.967, 0.963));
+        Opp7d: "opp7d", OPP7D, Border::new((129.3, 128.4), (0.967, 0.963));
         /// Optimised, 7 pulses, as near to six-step as they reach: where the drive weakens.
-        Opt7e: "opt7e", OPT7E, Border::new((129.3, 128.4), (f32::INFINITY, f32::INFINITY));
+        Opp7e: "opp7e", OPP7E, Border::new((129.3, 128.4), (f32::INFINITY, f32::INFINITY));
         /// Optimised, 5 pulses, at a small modulation index.
-        Opt5a: "opt5a", OPT5A, Border::new((177.0, 172.0), (0.81, 0.795));
+        Opp5a: "opp5a", OPP5A, Border::new((177.0, 172.0), (0.81, 0.795));
         /// Optimised, 5 pulses, at a larger one.
-        Opt5b: "opt5b", OPT5B, Border::new((177.0, 172.0), (0.932, 0.918));
+        Opp5b: "opp5b", OPP5B, Border::new((177.0, 172.0), (0.932, 0.918));
         /// Optimised, 5 pulses, near six-step.
-        Opt5c: "opt5c", OPT5C, Border::new((177.0, 172.0), (f32::INFINITY, f32::INFINITY));
+        Opp5c: "opp5c", OPP5C, Border::new((177.0, 172.0), (f32::INFINITY, f32::INFINITY));
         /// Optimised, 3 pulses.
-        Opt3a: "opt3a", OPT3A, Border::new((297.0, 290.0), (0.935, 0.915));
+        Opp3a: "opp3a", OPP3A, Border::new((297.0, 290.0), (0.935, 0.915));
         /// Optimised, 3 pulses, near six-step.
-        Opt3b: "opt3b", OPT3B, Border::new((297.0, 290.0), (f32::INFINITY, f32::INFINITY));
+        Opp3b: "opp3b", OPP3B, Border::new((297.0, 290.0), (f32::INFINITY, f32::INFINITY));
     }
 }
 
@@ -256,9 +256,27 @@ impl Mode {
         Self::ALL.into_iter().find(|mode| mode.name() == name)
     }
 
-    /// The name in traces and on the command line.
+    /// The name in reports and on the command line.
     pub const fn name(self) -> &'static str {
         self.row().name
+    }
+
+    /// The name of all branches of the same number of pulses: `opp7` of `opp7a` to `opp7e`; of any other mode its own.
+    pub fn family(self) -> &'static str {
+        if self.is_optimal() {
+            self.name().trim_end_matches(|letter: char| letter.is_ascii_lowercase())
+        } else {
+            self.name()
+        }
+    }
+
+    /// The mode with this name or, where it is that of a family, the branch that the drive plays at a modulation index on the way up;
+    /// `None` for any other text.
+    pub fn named_at(name: &str, index: f32) -> Option<Self> {
+        let mut branches = Self::ALL.into_iter().filter(|mode| mode.family() == name);
+        Self::named(name).or_else(|| {
+            branches.clone().find(|mode| index < mode.row().until.highest_index()).or(branches.next_back())
+        })
     }
 
     /// Carriers per turn of the pulse angle; 0 where the carrier is not locked to it.

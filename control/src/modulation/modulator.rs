@@ -5,7 +5,6 @@ use super::flying_start::FlyingStart;
 use super::half::boundary;
 #[cfg(feature = "optimal")]
 use super::optimal::{self, Branch};
-use super::pattern_transition::PatternTransition;
 use super::{CarrierHalf, Mode, Reference, Schedule, SwitchLimits, first_half, middle60, schedule};
 #[cfg(feature = "optimal")]
 use crate::frames::{AlphaBeta, six_step_v};
@@ -22,14 +21,15 @@ pub struct Modulator {
     next_half: u32,
     mirrored: bool,
     plan: Option<Plan>,
-    transition: PatternTransition,
+    /// By how many ticks the half before ended behind its boundary, where a pattern gives way to another there; 0 otherwise.
+    late_ticks: f32,
+    /// Fundamental of the pattern's half before, in V.
+    voltage_v: f32,
     /// `true` if the half before was a pattern's and the next one is a carrier's.
     after_pattern: bool,
     /// Carriers for which an optimised pattern has waited to take over from a free one.
     #[cfg(feature = "optimal")]
     waited: u32,
-    /// Half the zero voltage of the present pattern's sectors, as an angle in rad.
-    zero_rad: f32,
 }
 
 /// Share of a half that is zero voltage, over half the zero voltage of a sector of 60° as an angle in rad.
@@ -73,11 +73,11 @@ impl Modulator {
             next_half: 0,
             mirrored: false,
             plan: None,
-            transition: PatternTransition::DONE,
+            late_ticks: 0.0,
+            voltage_v: 0.0,
             after_pattern: false,
             #[cfg(feature = "optimal")]
             waited: 0,
-            zero_rad: 0.0,
         }
     }
 
@@ -203,8 +203,6 @@ impl Modulator {
         self.mode = mode;
         self.plan = None;
         self.after_pattern = from.is_pattern() && mode.is_carrier();
-        self.transition =
-            if from.is_pattern() { PatternTransition::begun(self.zero_rad) } else { PatternTransition::DONE };
         self.schedule.switched(start);
     }
 
@@ -273,22 +271,28 @@ impl Modulator {
             return self.optimal(branch, start, period_ticks, seen);
         }
         let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
-        self.zero_rad = own_rad;
-        let (period, notch) = match self.transition.sector(own_rad, self.mode.sector_halves()) {
-            Some(sector) => {
-                // The edge has the length that it should have, and whatever time is left is zero voltage.
-                let zero = nominal * (sector.zero_rad * ZERO_OF_HALF);
-                let edge = nominal - zero;
-                let left = wanted - sector.lead_rad * UNITS_PER_RADIAN * ticks_per_unit - edge;
-                let notch = self.transition.notch(left, zero, self.devices.min_pulse_ticks as f32);
-                (edge + notch.unwrap_or(0.0), notch)
-            }
-            None => {
-                let notched = !self.mode.is_whole() || own_rad > 0.0;
-                (wanted, notched.then_some(wanted * (own_rad * ZERO_OF_HALF)))
-            }
-        };
-        middle60::half(self.mode, self.next_half, self.whole_ticks(period), notch, &self.devices)
+        let late_ticks = core::mem::take(&mut self.late_ticks);
+        let due = wanted + late_ticks;
+        let mut notch = due * (own_rad * ZERO_OF_HALF);
+        // Where hexagons meet an edge has the length that it should have, and whatever time is left is zero voltage.
+        let beside_edge = |zero_rad: f32| due - nominal * (1.0 - zero_rad * ZERO_OF_HALF);
+        if let Some(next) = self.gives_way_to().filter(|next| next.is_pattern()) {
+            let old_rad = middle60::zero_rad(self.mode, self.voltage_v, seen.udc_v);
+            let next_rad = middle60::least_zero_rad(next, seen, &self.devices);
+            notch = beside_edge(old_rad);
+            self.late_ticks = (old_rad - next_rad) * (2.0 * UNITS_PER_RADIAN) * ticks_per_unit;
+        } else if late_ticks != 0.0 {
+            notch = beside_edge(own_rad);
+        }
+        self.voltage_v = seen.voltage_v;
+        let notched = !self.mode.is_whole() || own_rad > 0.0;
+        let period_ticks = self.whole_ticks(wanted + self.late_ticks);
+        middle60::half(self.mode, self.next_half, period_ticks, notched.then_some(notch), &self.devices)
+    }
+
+    /// The mode that takes over after the next half, if one does.
+    fn gives_way_to(&self) -> Option<Mode> {
+        Some(self.plan.filter(|plan| plan.at == self.half_after(self.next_half, 1))?.to)
     }
 
     /// One half of an optimised pattern, its edges moved by what the wanted mean voltage differs from the pattern's fundamental.
@@ -302,16 +306,10 @@ impl Modulator {
         let own = AlphaBeta { alpha: round.cos, beta: round.sin } * (index * core::f32::consts::FRAC_2_PI);
         let more_ticks = (seen.share_within(start, period_ticks) - own) * period_ticks as f32;
         let (half, wanted) = (self.next_half, (index, more_ticks));
-        match self.gives_way_to() {
+        match self.gives_way_to().and_then(|next| next.branch()) {
             Some(next) => optimal::last_half((branch, next), half, period_ticks, wanted, &self.devices),
             None => optimal::half(branch, half, period_ticks, wanted, &self.devices),
         }
-    }
-
-    /// The branch that takes over after the next half, if one does.
-    #[cfg(feature = "optimal")]
-    fn gives_way_to(&self) -> Option<&'static Branch> {
-        self.plan.filter(|plan| plan.at == self.half_after(self.next_half, 1))?.to.branch()
     }
 
     /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that
@@ -341,12 +339,12 @@ mod tests {
             let rate = (hz * 4_294_967_296.0 / 25e6) as f32;
             let mut now = Instant(0);
             for (index, mode) in [
-                (0.92, Mode::Opt7c),
-                (0.96, Mode::Opt7d),
-                (0.97, Mode::Opt7e),
-                (0.96, Mode::Opt7d),
-                (0.92, Mode::Opt7c),
-                (0.8, Mode::Opt7b),
+                (0.92, Mode::Opp7c),
+                (0.96, Mode::Opp7d),
+                (0.97, Mode::Opp7e),
+                (0.96, Mode::Opp7d),
+                (0.92, Mode::Opp7c),
+                (0.8, Mode::Opp7b),
             ] {
                 for _ in 0..2_000 {
                     let angle = Angle((f64::from(rate) * f64::from(now.0)) as u64 as u32);

@@ -28,6 +28,11 @@ impl Border {
     pub(super) const fn new(hz: (f32, f32), indices: (f32, f32)) -> Self {
         Self { shares: (hz.0 / 900.0, hz.1 / 900.0), indices }
     }
+
+    /// The modulation index at which the mode gives way on the way up.
+    pub(super) const fn highest_index(&self) -> f32 {
+        self.indices.0
+    }
 }
 
 /// The locked modes that a drive uses above the asynchronous one, from the lowest frequency up. It leaves each of them where that

@@ -5,6 +5,7 @@ use crate::browser::Browser;
 use crate::server;
 use anyhow::{Context, Result, ensure};
 use base64::Engine;
+use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -16,7 +17,16 @@ const WIDTHS: [u32; 3] = [1280, 900, 390];
 
 /// Scenarios of either system whose traces in the page are the host's. In the others the plant's sine, the browser's own, shows in a last digit.
 const SAME: [&[&str]; 2] = [
-    &["sweep", "load-steps", "full-step", "reversal", "link-steps", "chopper", "acknowledge"],
+    &[
+        "sweep",
+        "sweep --to 2000",
+        "load-steps",
+        "full-step",
+        "reversal",
+        "link-steps",
+        "chopper",
+        "acknowledge",
+    ],
     &["zs9-load-step"],
 ];
 
@@ -231,25 +241,55 @@ fn saves(browser: &mut Browser) -> Result<()> {
     Ok(())
 }
 
-/// Scenarios in the page make the host's bytes.
-fn equal_the_host(browser: &mut Browser, rig: &Path, names: &[&str]) -> Result<()> {
+/// Scenarios in the page make the host's bytes, and its verdicts; what the host refuses is refused.
+fn equal_the_host(browser: &mut Browser, rig: &Path, lines: &[&str]) -> Result<()> {
     let out = tempfile::tempdir()?;
-    for name in names {
+    for line in lines {
+        let words = line.split(' ').collect::<Vec<_>>();
         let mut host = Command::new(rig);
-        host.args(["run", name, "--on", "host", "--out"]).arg(out.path());
+        host.arg("run").args(&words).args(["--on", "host", "--out"]).arg(out.path());
         host.stdout(Stdio::null()).stderr(Stdio::null()).status()?;
-        let bytes =
-            std::fs::read(out.path().join("trace.csv")).with_context(|| format!("{name}: no trace"))?;
-        let host: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-        browser.evaluate(&format!(
-            "document.getElementById('scenario').value = '{name}'; document.getElementById('run').click()"
-        ))?;
-        browser.until("the scenario is done", "!!document.getElementById('sum').dataset.sha256")?;
-        let found = browser.evaluate("document.getElementById('sum').dataset.sha256")?;
-        println!("{name}: {}", browser.evaluate("document.getElementById('sum').textContent")?);
-        ensure!(found == host, "{name}'s trace.csv: {found} in the page, {host} on the host");
+        let read =
+            |name: &str| std::fs::read(out.path().join(name)).with_context(|| format!("{line}: no {name}"));
+        let sha256: String =
+            Sha256::digest(read("trace.csv")?).iter().map(|byte| format!("{byte:02x}")).collect();
+        let verdicts = &serde_json::from_slice::<Value>(&read("summary.json")?)?["figures"]["verdicts"];
+        let ran = in_the_page(browser, &words)?;
+        ensure!(ran["sha256"] == sha256, "{line}, trace.csv: {ran} in the page, {sha256} on the host");
+        ensure!(alike(&ran["verdicts"], verdicts), "{line}: {ran} in the page, {verdicts} on the host");
+        println!("{line}: {}", browser.evaluate("document.getElementById('sum').textContent")?);
     }
-    Ok(())
+    let refused = in_the_page(browser, &["sweep", "--to", "none"])?;
+    ensure!(refused.as_str().is_some_and(|said| said.contains("--to")), "not refused: {refused}");
+    browser.evaluate("document.getElementById('run').click()")?;
+    browser.until("the button runs one", "!!document.getElementById('sum').dataset.sha256")
+}
+
+/// `true` where the verdicts are the same: what is found may differ in a last digit, by the browser's own sine.
+fn alike(one: &Value, other: &Value) -> bool {
+    let (Some(one), Some(other)) = (one.as_array(), other.as_array()) else { return false };
+    let number = |of: &Value| of.as_f64().unwrap_or(f64::NAN);
+    let near = |one: f64, other: f64| {
+        one.is_nan() && other.is_nan() || (one - other).abs() <= 1e-6 * (1.0 + one.abs())
+    };
+    one.len() == other.len()
+        && one.iter().zip(other).all(|(one, other)| {
+            one["what"] == other["what"]
+                && one["verdict"] == other["verdict"]
+                && ["found", "at_most", "at_least"]
+                    .iter()
+                    .all(|key| near(number(&one[*key]), number(&other[*key])))
+        })
+}
+
+/// Answer of the page to a scenario with its words.
+fn in_the_page(browser: &mut Browser, words: &[&str]) -> Result<Value> {
+    let (name, words) = (json!(words[0]), json!(words[1..]));
+    browser.evaluate(&format!(
+        "globalThis.said = null; tractive.run({name}, {words}).then(of => {{ globalThis.said = of; }}, of => {{ globalThis.said = of.message; }}); 0"
+    ))?;
+    browser.until("the scenario is done", "!!globalThis.said")?;
+    browser.evaluate("globalThis.said")
 }
 
 /// Size of the smallest letters, in CSS pixels.

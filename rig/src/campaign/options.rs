@@ -21,7 +21,7 @@ pub struct CampaignOptions {
     /// The pulse patterns of the PMaSynRM drive above the free carrier.
     #[arg(long, value_enum, default_value = "paper")]
     pub patterns: PatternsName,
-    /// Folder for cases.csv, summary.json and report.html.
+    /// Folder for campaign.csv, summary.json and report.html.
     #[arg(long, default_value = "target/tractive/campaign")]
     pub out: PathBuf,
     /// A document whose generated part is written anew: the tables of the fast campaign, the totals of the full one, the coverage of the
@@ -46,9 +46,12 @@ pub struct CampaignOptions {
     /// Seed of what is at random.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Shard K of N, from 0: its runs alone, into the file shard-K-of-N.csv of the folder, from which `merge` makes the whole.
+    /// Shard K of N, from 0: its runs alone, into the file shard-K-of-N.csv of the folder, from which --merge makes the whole.
     #[arg(long, value_name = "K/N", conflicts_with_all = ["doc", "json"])]
     pub shard: Option<Shard>,
+    /// Instead of running anything: makes the whole of shards that were run into these folders.
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "doc", "only", "fast", "without", "healthy", "random"])]
+    pub merge: Vec<PathBuf>,
     /// Print the totals as JSON.
     #[arg(long)]
     pub json: bool,

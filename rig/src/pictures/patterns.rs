@@ -21,9 +21,9 @@ const HIGHEST: f64 = 12.0;
 /// nothing of itself.
 fn name_place(name: &str) -> (f64, f64, Side) {
     match name {
-        "opt5c" => (0.0, 0.0, Side::Left),
-        "opt7e" => (1.0, -0.35, Side::Right),
-        "opt13b" | "opt15" | "opt11" | "opt7a" | "opt7c" => (0.33, -0.25, Side::Left),
+        "opp5c" => (0.0, 0.0, Side::Left),
+        "opp7e" => (1.0, -0.35, Side::Right),
+        "opp13b" | "opp15" | "opp11" | "opp7a" | "opp7c" => (0.33, -0.25, Side::Left),
         _ => (0.5, 0.2, Side::Right),
     }
 }

@@ -1,44 +1,67 @@
-//! Scenarios that are driven for their trace alone, without figures or pages, where there are no files.
+//! Scenarios that are driven for their trace and their figures, without pages, where there are no files.
 
 use super::traction::{self, Traction};
 use super::zs9::{self, Zs9};
 use super::{Scenario, System, filled};
+use crate::analysis::Figures;
 use crate::machine::Machine;
 use crate::options::Options;
 use anyhow::Result;
-use clap::{Args, Command};
+use clap::{ArgMatches, Args, Command, FromArgMatches};
+use serde::Serialize;
+use serde_json::Map;
 
-/// A scenario by name, and what drives it as its command line without options of its own does.
+/// A scenario by name, and what drives it as its command line does.
 pub struct Planned<S: System> {
     /// The name on the command line.
     pub name: &'static str,
     drive: Drive<S>,
 }
 
-/// The run of a scenario by its name.
-type Drive<S> = fn(&'static str, &Options<<S as System>::Own>, &Machine) -> Result<<S as System>::Recording>;
+/// The run of a scenario by its name, with the words behind it.
+type Drive<S> = fn(
+    &'static str,
+    &[String],
+    &dyn Fn(&str) -> Result<Machine>,
+) -> Result<(<S as System>::Recording, Figures)>;
 
 impl<S: System> Planned<S> {
-    const fn of<T: Scenario<S> + Args>(name: &'static str) -> Self {
+    const fn of<T: Scenario<S> + Args + Serialize>(name: &'static str) -> Self {
         Self { name, drive: driven::<S, T> }
     }
 
-    /// Drives it.
-    pub fn drive(&self, options: &Options<S::Own>, machine: &Machine) -> Result<S::Recording> {
-        (self.drive)(self.name, options, machine)
+    /// Drives it with the words of its command line on a machine of these; its recording and its figures.
+    pub fn drive(
+        &self,
+        words: &[String],
+        machines: &dyn Fn(&str) -> Result<Machine>,
+    ) -> Result<(S::Recording, Figures)> {
+        (self.drive)(self.name, words, machines)
     }
 }
 
-fn driven<S: System, T: Scenario<S> + Args>(
+fn driven<S: System, T: Scenario<S> + Args + Serialize>(
     name: &'static str,
-    options: &Options<S::Own>,
-    machine: &Machine,
-) -> Result<S::Recording> {
-    let command = T::augment_args(Command::new(name).no_binary_name(true));
-    let scenario = T::from_arg_matches(&command.try_get_matches_from([""; 0])?)?;
-    let options = filled(&scenario, options, machine);
-    S::check(&options, &serde_json::Map::new(), machine)?;
-    S::run(name, scenario.plan(&options, machine), &options, machine, None)
+    words: &[String],
+    machines: &dyn Fn(&str) -> Result<Machine>,
+) -> Result<(S::Recording, Figures)> {
+    let (matches, options) = read::<S::Own>(T::augment_args(Command::new(name).no_binary_name(true)), words)?;
+    let scenario = T::from_arg_matches(&matches)?;
+    let own = serde_json::to_value(&scenario)?;
+    let machine = machines(options.machine.as_deref().unwrap_or(S::MACHINE))?;
+    S::check(&options, own.as_object().unwrap_or(&Map::new()), &machine)?;
+    let options = filled(&scenario, &options, &machine);
+    let recording = S::run(name, scenario.plan(&options, &machine), &options, &machine, None)?;
+    let figures = scenario.figures(&recording, &options, &machine);
+    Ok((recording, figures))
+}
+
+/// A command line with the options that all scenarios of a system share, read; once for all of them, for the size of the page.
+#[inline(never)]
+fn read<O: Args + Clone>(command: Command, words: &[String]) -> Result<(ArgMatches, Options<O>)> {
+    let matches = Options::<O>::augment_args(command).try_get_matches_from(words)?;
+    let options = Options::from_arg_matches(&matches)?;
+    Ok((matches, options))
 }
 
 /// Those of the PMaSynRM drive.

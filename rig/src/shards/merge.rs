@@ -31,11 +31,12 @@ impl Merged {
     }
 }
 
-/// Merges the files of a folder. Refuses gaps, duplicates, and files of another program, configuration or number of shards.
-pub fn merge(folder: &Path) -> Result<Merged> {
-    let paths = paths(folder)?;
+/// Merges the files of folders. Refuses gaps, duplicates, and files of another program, configuration or number of shards.
+pub fn merge(folders: &[PathBuf]) -> Result<Merged> {
+    let named = folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ");
+    let paths = folders.iter().map(|folder| paths(folder)).collect::<Result<Vec<_>>>()?.concat();
     let Some(first) = paths.first() else {
-        bail!("{}: no file named shard-K-of-N.csv in it", folder.display());
+        bail!("{named}: no file named shard-K-of-N.csv in it");
     };
     let ShardFile { plan, shard: Shard { shards, .. }, .. } = ShardFile::read(first)?;
     let mut by_shard = BTreeMap::new();
@@ -58,7 +59,7 @@ pub fn merge(folder: &Path) -> Result<Merged> {
     }
     if let Some(shard) = (0..shards).find(|shard| !by_shard.contains_key(shard)) {
         let shard = Shard { shard, shards };
-        bail!("{}: shard {shard} is missing", folder.join(name(shard)).display());
+        bail!("{named}: shard {shard} is missing, {}", name(shard));
     }
     let row = |run: usize| {
         let (path, rows) = by_shard.get_mut(&(run % shards)).context("a shard that is there")?;

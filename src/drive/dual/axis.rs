@@ -186,6 +186,7 @@ impl<L: ControlLaw> Axis<L> {
                 demand: &demand,
                 window: None,
                 udc_v: input.measured.udc_v,
+                change_v: 0.0,
                 link_scale: 1.0,
                 swing: None,
                 limits: &limits,

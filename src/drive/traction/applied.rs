@@ -85,15 +85,31 @@ pub(super) fn limits(
     // Edges can move at an optimised pattern's largest index, too.
     let is_all = mode.is_whole() || mode.is_optimal();
     let largest = if is_all { largest } else { REGULATION_ROOM * largest };
+    // The last half before another pattern leads to the point that the torque's trim asks for there.
+    let trimmed = if mode.is_pattern() && decision.after.is_pattern() { decision.after } else { mode };
     let (index_limit, filled) = exit.fill(mode, largest, steady.modulation_index, passed_s);
     ModeLimits {
         follows: follows(mode),
         index_limit,
         steady_share: 1.0,
         filled,
-        ripple_share: ripple_share(mode, steady.modulation_index),
+        ripple_share: ripple_share(trimmed, steady.modulation_index),
         settled: exit.is_settled(decision),
     }
+}
+
+/// The change of the link that is expected after the sample of a command, in V.
+#[derive(Clone, Copy)]
+pub(super) struct Ahead {
+    /// In the middle of the halves that are committed.
+    pub committed_v: f32,
+    /// In the middle of the half that the command is for.
+    pub next_v: f32,
+}
+
+impl Ahead {
+    /// A link that stands still.
+    pub const NONE: Self = Self { committed_v: 0.0, next_v: 0.0 };
 }
 
 /// The half that a command is made for.
@@ -106,6 +122,21 @@ pub(super) struct Wanted<'a> {
     /// are made from.
     pub between: u32,
     pub before: &'a Reference,
+    /// Mean link voltage until then, in V.
+    pub udc_v: f32,
+}
+
+/// Expected length of a half of a mode, in s.
+#[inline(always)]
+pub(super) fn interval_s(mode: Mode, omega: f32, settings: &Settings) -> f32 {
+    let Settings { clock, devices, .. } = settings;
+    let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
+    match mode.carriers() {
+        // A command acts for a control period at least.
+        0 if shortest_s < clock.control_s => clock.control_s,
+        0 => shortest_s,
+        carriers => core::f32::consts::PI / (carriers as f32 * omega.abs()),
+    }
 }
 
 /// The modulator's pulses from `now`, the instant of the currents, until a command of this period can act.
@@ -117,15 +148,9 @@ pub(super) fn committed(
     settings: &Settings,
     wanted: &Wanted,
 ) -> Committed {
-    let Wanted { mode: decided, revises, between, before: command } = *wanted;
-    let Settings { clock, devices, .. } = settings;
-    let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
-    let interval_s = match decided.carriers() {
-        // A command acts for a control period at least.
-        0 if shortest_s < clock.control_s => clock.control_s,
-        0 => shortest_s,
-        carriers => core::f32::consts::PI / (carriers as f32 * steady.omega.abs()),
-    };
+    let Wanted { mode: decided, revises, between, before: command, udc_v } = *wanted;
+    let clock = &settings.clock;
+    let interval_s = interval_s(decided, steady.omega, settings);
     let Some(newest) = pulses.newest() else {
         return Committed { horizon_s: 0.0, volt_seconds: None, ripple: None, interval_s };
     };
@@ -141,7 +166,7 @@ pub(super) fn committed(
     let volt_ticks = (!newest.is_off() && !running.is_off())
         .then(|| if revises { rest() } else { rest() + newest.volt_ticks });
     let left = newest.begins.since(now).max(0) as u32 + if revises { 0 } else { period_ticks };
-    let volt_seconds = volt_ticks.map(|ticks| ticks * (steady.udc_v * clock.tick_s));
+    let volt_seconds = volt_ticks.map(|ticks| ticks * (udc_v * clock.tick_s));
     let gap = between * period_ticks;
     let made = || command.vector_at(now.after(left + gap / 2)) * clock.seconds(gap as i32);
     Committed {

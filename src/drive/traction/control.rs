@@ -4,7 +4,7 @@ mod checks;
 mod law;
 mod start_up;
 
-use super::applied::NO_LIMITS;
+use super::applied::{Ahead, NO_LIMITS};
 use super::current_delay::CurrentDelay;
 use super::current_gains::CurrentGains;
 use super::current_zeros::CurrentZeros;
@@ -13,7 +13,7 @@ use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
 use crate::control::{
-    AngleHarmonics, ControlLaw, Controller, LinkDamper, Measurements, ModeLimits, Target, Warmth,
+    AngleHarmonics, ControlLaw, Controller, LinkDamper, LinkRipple, Measurements, ModeLimits, Target, Warmth,
 };
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
@@ -61,6 +61,10 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     /// The link's voltage over what its sensor reads, as far as it is known.
     link_scale: f32,
     damper: LinkDamper,
+    /// The link's ripple, the instant of its last sample, and the change that is expected of the link (see [`Ahead`]).
+    ripple: LinkRipple,
+    link_seen: Instant,
+    ahead: Ahead,
     /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
     demand_nm: f32,
     jumped: bool,
@@ -116,6 +120,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             exit: SixStepExit::new(),
             link_scale: 1.0,
             damper: LinkDamper::at(0.0),
+            ripple: LinkRipple::at(0.0),
+            link_seen: first,
+            ahead: Ahead::NONE,
             demand_nm: 0.0,
             jumped: false,
             reference: Reference::NONE,

@@ -42,7 +42,7 @@ pub struct Settings {
     pub devices: SwitchLimits,
     /// The current loop's gains.
     pub gains: Gains,
-    /// Age of the angle when it is sampled, in s.
+    /// Age of the angle when it is sampled, in s; negative where it is read after the currents.
     pub angle_late_s: f32,
     /// Step of a count of the angle, electrical, in rad; 0: it has none to speak of.
     pub angle_step_rad: f32,

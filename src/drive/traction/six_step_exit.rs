@@ -3,8 +3,12 @@
 use super::slot::Decision;
 use crate::frames::six_step_v;
 use crate::machine::Ratings;
-use crate::modulation::{Mode, TRANSITION_SECTORS};
+use crate::modulation::Mode;
 use crate::time::Instant;
+
+/// Sectors of 60° in which the load angle follows the voltage, where one pattern takes over from another. Chosen by trial: with one 12 N·m are
+/// missing at the end of square wave, with four 2.
+const TRANSITION_SECTORS: u32 = 4;
 
 /// Rate at which the voltage falls from square wave to the one that the torque needs, in shares of six-step per second.
 const EXIT_PER_S: f32 = 12.0;
@@ -19,14 +23,14 @@ const ONE_SIDED_SHARE: f32 = 0.001;
 /// decay against the link.
 const CROSSING_S: f32 = 2e-3;
 
-/// The exit ramp from square wave: voltage and torque on their way to what the torque needs, and a flux hexagon off its centre.
+/// The exit ramp from square wave: voltage and torque on their way to what the torque needs.
 pub(super) struct SixStepExit {
     /// Fundamental to which the voltage has fallen after square wave, as a share of six-step; 0 otherwise.
     filled_to: f32,
     /// The last torque, in N·m, none as the least positive one; 0 before the first. Its sign is the side of the flux circle on which the
     /// machine is: no torque lies with the positive ones there.
     side_nm: f32,
-    /// Mode that the newest command was made for, and the halves for which its flux hexagon still changes its size.
+    /// Mode that the newest command was made for, and the halves in which its load angle still changes with the voltage.
     unsettled: (Mode, u32),
     /// The boundary that was counted last.
     counted: Instant,
@@ -56,8 +60,8 @@ impl SixStepExit {
     }
 
     /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
-    /// after it for as long as the voltage falls from there to what the torque `needed` in the last period: once the pattern has
-    /// grown.
+    /// after it for as long as the voltage falls from there to what the torque `needed` in the last period: once the load
+    /// angle has followed.
     pub(super) fn fill(&mut self, decided: Mode, largest: f32, needed: f32, period_s: f32) -> (f32, bool) {
         if decided.is_whole() {
             self.filled_to = 1.0;
@@ -93,10 +97,9 @@ impl SixStepExit {
         sided_nm
     }
 
-    /// True once a pattern has grown out of another when a decision is made: until then the flux hexagon is off its centre, on its way to
-    /// another size.
+    /// True once the load angle has followed a pattern that took over from another, when a decision is made.
     pub(super) fn is_settled(&mut self, decision: &Decision) -> bool {
-        let Decision { boundary, mode: decided } = *decision;
+        let Decision { boundary, mode: decided, .. } = *decision;
         let (mode, halves) = &mut self.unsettled;
         if decided != *mode {
             let grows = decided.is_pattern() && mode.is_pattern();
@@ -107,5 +110,99 @@ impl SixStepExit {
         }
         self.counted = boundary;
         *halves == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+
+    /// With a least torque of 3 N·m.
+    const RATINGS: Ratings = Ratings { max_torque_nm: 3_000.0, ..BUILT_IN.ratings };
+
+    /// Out of square wave.
+    fn exit(side_nm: Option<f32>) -> SixStepExit {
+        let mut exit = SixStepExit::new();
+        assert_eq!(exit.fill(Mode::Square, 0.97, 0.4, 1.0), (0.97, true));
+        side_nm.into_iter().for_each(|side_nm| exit.drove(side_nm));
+        exit
+    }
+
+    #[test]
+    fn the_voltage_falls_to_what_the_torque_needs() {
+        let mut exit = exit(None);
+        // 12 a second: a quarter in each of these periods.
+        let period_s = 1.0 / 48.0;
+        assert_eq!(
+            exit.fill(Mode::Mid3, 0.97, 0.75, period_s),
+            (0.75, true),
+            "what is needed is still there"
+        );
+        assert_eq!(exit.fill(Mode::Mid3, 0.45, 0.4, period_s), (0.45, true), "no more than the largest");
+        assert_eq!(exit.fill(Mode::Mid3, 0.97, 0.4, period_s), (0.97, false));
+        assert_eq!(exit.fill(Mode::Mid3, 0.97, 0.0, 0.0), (0.0, true), "and nothing is left of it");
+        let mut exit = self::exit(None);
+        assert_eq!(exit.fill(Mode::Sync12, 0.9, 0.1, period_s), (0.9, false), "a carrier needs no ramp");
+    }
+
+    #[test]
+    fn it_falls_once_the_pattern_has_grown() {
+        let mut exit = exit(None);
+        let at = |boundary, mode| Decision { boundary: Instant(boundary), mode };
+        assert!(exit.is_settled(&at(0, Mode::Square)), "out of none");
+        let halves = TRANSITION_SECTORS * Mode::Mid3.sector_halves();
+        assert!(halves > 1);
+        for boundary in 0..halves {
+            assert!(!exit.is_settled(&at(boundary, Mode::Mid3)), "{boundary}");
+            assert!(!exit.is_settled(&at(boundary, Mode::Mid3)), "{boundary}, once more");
+            assert_eq!(exit.fill(Mode::Mid3, 0.97, 0.1, 1.0 / 48.0), (0.97, true));
+        }
+        assert!(exit.is_settled(&at(halves, Mode::Mid3)));
+        assert_eq!(exit.fill(Mode::Mid3, 0.97, 0.1, 1.0 / 48.0), (0.75, true));
+        assert!(exit.is_settled(&at(halves + 1, Mode::Sync12)), "a carrier needs no growth");
+        assert!(exit.is_settled(&at(halves + 2, Mode::Mid7)), "nor does a pattern out of one");
+    }
+
+    /// Side of the circle, torque demanded, torque that is given, and whether the gates pause for its sign; six-step is 955 V.
+    #[test]
+    fn torque_keeps_its_side_while_voltage_forces_flux() {
+        for (side_nm, demand_nm, given_nm, crosses) in [
+            (Some(50.0), 5.0, 5.0, false),
+            (Some(50.0), 3.0, 3.0, false),
+            (Some(50.0), 2.5, 3.0, false),
+            (Some(50.0), -2.5, 3.0, false),
+            (Some(50.0), -500.0, 3.0, false),
+            (Some(3.0), 2.5, 3.0, false),
+            (Some(3.0), -2.5, 3.0, false),
+            (Some(3.0), -3.5, 3.0, true),
+            (Some(-3.0), 3.5, -3.0, true),
+            (Some(-50.0), -5.0, -5.0, false),
+            (Some(-50.0), -2.5, -3.0, false),
+            // None is as the least positive one; before the first it is the demand's.
+            (Some(0.0), -5.0, 3.0, true),
+            (None, -5.0, -5.0, false),
+            (None, 2.5, 3.0, false),
+        ] {
+            let mut forced = exit(side_nm);
+            let got_nm = forced.one_sided(demand_nm, 500.0, 1_500.0, &RATINGS);
+            assert!((got_nm - given_nm).abs() < 1e-5, "{side_nm:?} {demand_nm}: {got_nm}");
+            assert_eq!(forced.crosses(), crosses, "{side_nm:?} {demand_nm}");
+            // 1.1 times this EMF is more than the voltage.
+            let mut free = exit(side_nm);
+            assert_eq!(free.one_sided(demand_nm, 900.0, 1_500.0, &RATINGS), demand_nm);
+            assert!(!free.crosses());
+        }
+    }
+
+    #[test]
+    fn a_pause_lasts_two_milliseconds_and_leaves_no_side() {
+        let mut exit = exit(Some(3.0));
+        exit.one_sided(-5.0, 500.0, 1_500.0, &RATINGS);
+        exit.rest(1.9e-3);
+        assert!(exit.crosses());
+        exit.rest(0.2e-3);
+        assert!(!exit.crosses());
+        assert_eq!(exit.one_sided(-5.0, 500.0, 1_500.0, &RATINGS), -5.0);
     }
 }

@@ -12,6 +12,8 @@ const MOST_BETWEEN: u32 = 2;
 pub(super) struct Decision {
     pub boundary: Instant,
     pub mode: Mode,
+    /// The mode of the half after that, as far as it is decided.
+    pub after: Mode,
 }
 
 /// The work of a control period. A boundary uses the last command that is valid by then, and of those before it nothing: so each
@@ -34,7 +36,7 @@ impl Slot {
     #[inline]
     pub(super) fn of(newest: Option<&Half>, now: Instant, clock: &Clock) -> Self {
         let Some(newest) = newest else {
-            let key = Decision { boundary: now, mode: Mode::Off };
+            let key = Decision { boundary: now, mode: Mode::Off, after: Mode::Off };
             return Self { now, key, commands: true, aims: false, between: 0 };
         };
         let period = clock.control_ticks;
@@ -44,7 +46,7 @@ impl Slot {
         let rest = later(0).since(valid);
         if rest >= 2 * period as i32 {
             // Most periods of a long half.
-            let key = Decision { boundary: newest.begins, mode: next };
+            let key = Decision { boundary: newest.begins, mode: next, after: next_but_one };
             return Self { now, key, commands: false, aims: false, between: 0 };
         }
         let halves = if rest >= 0 {
@@ -61,7 +63,7 @@ impl Slot {
         let mode = if between == 0 { next } else { next_but_one };
         Self {
             now,
-            key: Decision { boundary: later(between), mode },
+            key: Decision { boundary: later(between), mode, after: next_but_one },
             commands,
             aims: !commands && left < 2 * period as i32,
             between,

@@ -39,22 +39,22 @@ pub struct Branch {
 /// The branches, from many pulses to few and from a small modulation index to a large one.
 #[rustfmt::skip]
 pub const BRANCHES: [Branch; 16] = [
-    Branch { name: "opt15", pulses: 15, starts_high: false, halves: 6, anchor: 50, window: (10, 58), calm: 1, place: 0, highest_hz: 60.0 },
-    Branch { name: "opt13a", pulses: 13, starts_high: false, halves: 5, anchor: 50, window: (10, 64), calm: 1, place: 0, highest_hz: 69.2 },
-    Branch { name: "opt13b", pulses: 13, starts_high: true, halves: 5, anchor: 70, window: (62, 79), calm: 5, place: 1, highest_hz: 69.2 },
-    Branch { name: "opt11", pulses: 11, starts_high: false, halves: 4, anchor: 60, window: (10, 73), calm: 3, place: 0, highest_hz: 81.8 },
-    Branch { name: "opt9a", pulses: 9, starts_high: true, halves: 4, anchor: 40, window: (10, 55), calm: 3, place: 0, highest_hz: 100.0 },
-    Branch { name: "opt9b", pulses: 9, starts_high: false, halves: 4, anchor: 65, window: (50, 82), calm: 3, place: 1, highest_hz: 100.0 },
-    Branch { name: "opt7a", pulses: 7, starts_high: true, halves: 3, anchor: 50, window: (10, 70), calm: 1, place: 0, highest_hz: 128.6 },
-    Branch { name: "opt7b", pulses: 7, starts_high: false, halves: 3, anchor: 75, window: (62, 89), calm: 3, place: 1, highest_hz: 128.6 },
-    Branch { name: "opt7c", pulses: 7, starts_high: true, halves: 3, anchor: 90, window: (86, 96), calm: 2, place: 2, highest_hz: 128.6 },
-    Branch { name: "opt7d", pulses: 7, starts_high: false, halves: 6, anchor: 96, window: (94, 97), calm: 6, place: 3, highest_hz: 128.6 },
-    Branch { name: "opt7e", pulses: 7, starts_high: false, halves: 5, anchor: 97, window: (95, 97), calm: 5, place: 4, highest_hz: 128.6 },
-    Branch { name: "opt5a", pulses: 5, starts_high: true, halves: 2, anchor: 60, window: (10, 84), calm: 1, place: 0, highest_hz: 180.0 },
-    Branch { name: "opt5b", pulses: 5, starts_high: false, halves: 2, anchor: 85, window: (76, 94), calm: 2, place: 1, highest_hz: 180.0 },
-    Branch { name: "opt5c", pulses: 5, starts_high: true, halves: 2, anchor: 95, window: (91, 97), calm: 2, place: 2, highest_hz: 180.0 },
-    Branch { name: "opt3a", pulses: 3, starts_high: true, halves: 1, anchor: 80, window: (10, 95), calm: 1, place: 0, highest_hz: 300.0 },
-    Branch { name: "opt3b", pulses: 3, starts_high: false, halves: 1, anchor: 95, window: (90, 98), calm: 1, place: 1, highest_hz: 300.0 },
+    Branch { name: "opp15", pulses: 15, starts_high: false, halves: 6, anchor: 50, window: (10, 58), calm: 1, place: 0, highest_hz: 60.0 },
+    Branch { name: "opp13a", pulses: 13, starts_high: false, halves: 5, anchor: 50, window: (10, 64), calm: 1, place: 0, highest_hz: 69.2 },
+    Branch { name: "opp13b", pulses: 13, starts_high: true, halves: 5, anchor: 70, window: (62, 79), calm: 5, place: 1, highest_hz: 69.2 },
+    Branch { name: "opp11", pulses: 11, starts_high: false, halves: 4, anchor: 60, window: (10, 73), calm: 3, place: 0, highest_hz: 81.8 },
+    Branch { name: "opp9a", pulses: 9, starts_high: true, halves: 4, anchor: 40, window: (10, 55), calm: 3, place: 0, highest_hz: 100.0 },
+    Branch { name: "opp9b", pulses: 9, starts_high: false, halves: 4, anchor: 65, window: (50, 82), calm: 3, place: 1, highest_hz: 100.0 },
+    Branch { name: "opp7a", pulses: 7, starts_high: true, halves: 3, anchor: 50, window: (10, 70), calm: 1, place: 0, highest_hz: 128.6 },
+    Branch { name: "opp7b", pulses: 7, starts_high: false, halves: 3, anchor: 75, window: (62, 89), calm: 3, place: 1, highest_hz: 128.6 },
+    Branch { name: "opp7c", pulses: 7, starts_high: true, halves: 3, anchor: 90, window: (86, 96), calm: 2, place: 2, highest_hz: 128.6 },
+    Branch { name: "opp7d", pulses: 7, starts_high: false, halves: 6, anchor: 96, window: (94, 97), calm: 6, place: 3, highest_hz: 128.6 },
+    Branch { name: "opp7e", pulses: 7, starts_high: false, halves: 5, anchor: 97, window: (95, 97), calm: 5, place: 4, highest_hz: 128.6 },
+    Branch { name: "opp5a", pulses: 5, starts_high: true, halves: 2, anchor: 60, window: (10, 84), calm: 1, place: 0, highest_hz: 180.0 },
+    Branch { name: "opp5b", pulses: 5, starts_high: false, halves: 2, anchor: 85, window: (76, 94), calm: 2, place: 1, highest_hz: 180.0 },
+    Branch { name: "opp5c", pulses: 5, starts_high: true, halves: 2, anchor: 95, window: (91, 97), calm: 2, place: 2, highest_hz: 180.0 },
+    Branch { name: "opp3a", pulses: 3, starts_high: true, halves: 1, anchor: 80, window: (10, 95), calm: 1, place: 0, highest_hz: 300.0 },
+    Branch { name: "opp3b", pulses: 3, starts_high: false, halves: 1, anchor: 95, window: (90, 98), calm: 1, place: 1, highest_hz: 300.0 },
 ];
 
 /// A branch with its angles.

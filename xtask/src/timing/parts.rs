@@ -61,7 +61,7 @@ const PARTS: [(&str, Group, &[&str]); 28] = [
     ("cells and messages", Around, &["cell.rs", "drive/messages.rs", "drive/dual/messages.rs"]),
     ("choice of the mode", Paper, &["modulation/schedule.rs"]),
     ("dead-time compensation", Beyond, &["modulation/dead_time.rs"]),
-    ("transition between patterns", Beyond, &["modulation/pattern_transition.rs"]),
+    ("link's ripple", Beyond, &["control/link_ripple.rs"]),
     ("shoot-through", Paper, &["nine_switch/shoot_through.rs"]),
     ("pulses", Paper, &["modulation/", "nine_switch/", "drive/traction/pulses.rs"]),
     ("axis of a motor", Around, &["drive/dual/axis.rs"]),

@@ -143,3 +143,40 @@ fn the_documentation_has_the_table_that_the_code_has() {
         assert_eq!(documented, wanted, "the table of {page} should be:\n{}", wanted.join("\n"));
     }
 }
+
+/// The pins of a kind alone, each with its function, and no other pin touched.
+#[test]
+fn each_kind_of_pin_is_configured_by_itself() {
+    use nucleo_g474re::pins::{configure_bus, configure_gates, configure_inputs};
+    use nucleo_g474re::registers::Registers;
+    let kinds: [(fn(&Registers, &[Pin]), fn(&Pin) -> bool); 3] = [
+        (configure_inputs, |pin| !matches!(pin.function, Function::Gate(_) | Function::Bus(_))),
+        (configure_bus, |pin| matches!(pin.function, Function::Bus(_))),
+        (configure_gates, |pin| matches!(pin.function, Function::Gate(_))),
+    ];
+    for (configure, is_kind) in kinds {
+        let registers = Bench::new().registers;
+        let mode = |pin: &Pin| pin.port.of(&registers).moder().read().moder(usize::from(pin.number));
+        let before: Vec<_> = PINS.iter().map(&mode).collect();
+        configure(&registers, &PINS);
+        for (pin, before) in PINS.iter().zip(before) {
+            let wanted = match pin.function {
+                _ if !is_kind(pin) => before,
+                Function::Gate(_) | Function::Alternate(_) | Function::Bus(_) => Moder::ALTERNATE,
+                Function::Analog => Moder::ANALOG,
+                Function::Input => Moder::INPUT,
+                Function::Output | Function::Switch => Moder::OUTPUT,
+            };
+            assert_eq!(mode(pin), wanted, "{}", name(pin));
+            let port = pin.port.of(&registers);
+            let number = usize::from(pin.number);
+            if let (
+                true,
+                Function::Gate(function) | Function::Alternate(function) | Function::Bus(function),
+            ) = (is_kind(pin), pin.function)
+            {
+                assert_eq!(port.afr(number / 8).read().afr(number % 8), function, "{}", name(pin));
+            }
+        }
+    }
+}

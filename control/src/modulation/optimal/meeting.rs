@@ -25,7 +25,7 @@ impl Branch {
             [0, 1..=3] | [1..=3, 0] | [1, 1 | 3] | [3, 1] | [2, 2] => 0,
             // Seven pulses and five; from five to three the loop leaves 64 N·m there, 13 N·m at 30°.
             [2, 1] | [1, 2] if self.angles + next.angles == 5 => 0,
-            // Near six-step `opt7e` and `opt5c` likewise: 51 N·m there, 3 N·m at 30°.
+            // Near six-step `opp7e` and `opp5c` likewise: 51 N·m there, 3 N·m at 30°.
             [2, 4] | [4, 2] if self.angles == next.angles => 0,
             _ => self.halves,
         }
@@ -137,7 +137,7 @@ mod tests {
                 let most = match (*lower, *upper) {
                     _ if lower.carriers() == upper.carriers() => 0.0002,
                     // Only where the index falls while the frequency rises.
-                    (Mode::Opt5c, Mode::Opt3a) => 0.045,
+                    (Mode::Opp5c, Mode::Opp3a) => 0.045,
                     _ => 0.012,
                 };
                 let worst = worst(*lower, *upper);

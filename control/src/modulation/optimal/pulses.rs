@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn edges_move_by_the_volt_seconds_that_are_asked_for() {
-        let branch = Mode::named("opt11").and_then(Mode::branch).unwrap();
+        let branch = Mode::named("opp11").and_then(Mode::branch).unwrap();
         let more = AlphaBeta { alpha: 60.0, beta: -25.0 };
         for at in 0..4 * branch.quarter() {
             let [plain, moved] =
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn moved_edges_keep_the_shortest_pulse() {
         let devices = SwitchLimits { min_pulse_ticks: 250, ..DEVICES };
-        let branch = Mode::named("opt7b").and_then(Mode::branch).unwrap();
+        let branch = Mode::named("opp7b").and_then(Mode::branch).unwrap();
         for more in [1e5, -1e5].map(|alpha| AlphaBeta { alpha, beta: 0.7 * alpha }) {
             let halves = 0..4 * branch.quarter();
             let played: Vec<_> = halves.map(|at| half(branch, at, PERIOD, (0.8, more), &devices)).collect();

@@ -5,7 +5,7 @@ use super::Branch;
 
 /// 15 pulses a turn, modulation index 0.10 to 0.58.
 #[rustfmt::skip]
-pub static OPT15: Branch = Branch {
+pub static OPP15: Branch = Branch {
     starts_high: false,
     halves: 6,
     calm: 1,
@@ -70,7 +70,7 @@ pub static OPT15: Branch = Branch {
 
 /// 13 pulses a turn, modulation index 0.10 to 0.64.
 #[rustfmt::skip]
-pub static OPT13A: Branch = Branch {
+pub static OPP13A: Branch = Branch {
     starts_high: false,
     halves: 5,
     calm: 1,
@@ -141,7 +141,7 @@ pub static OPT13A: Branch = Branch {
 
 /// 13 pulses a turn, modulation index 0.62 to 0.79.
 #[rustfmt::skip]
-pub static OPT13B: Branch = Branch {
+pub static OPP13B: Branch = Branch {
     starts_high: true,
     halves: 5,
     calm: 5,
@@ -175,7 +175,7 @@ pub static OPT13B: Branch = Branch {
 
 /// 11 pulses a turn, modulation index 0.10 to 0.73.
 #[rustfmt::skip]
-pub static OPT11: Branch = Branch {
+pub static OPP11: Branch = Branch {
     starts_high: false,
     halves: 4,
     calm: 3,
@@ -255,7 +255,7 @@ pub static OPT11: Branch = Branch {
 
 /// 9 pulses a turn, modulation index 0.10 to 0.55.
 #[rustfmt::skip]
-pub static OPT9A: Branch = Branch {
+pub static OPP9A: Branch = Branch {
     starts_high: true,
     halves: 4,
     calm: 3,
@@ -317,7 +317,7 @@ pub static OPT9A: Branch = Branch {
 
 /// 9 pulses a turn, modulation index 0.50 to 0.82.
 #[rustfmt::skip]
-pub static OPT9B: Branch = Branch {
+pub static OPP9B: Branch = Branch {
     starts_high: false,
     halves: 4,
     calm: 3,
@@ -366,7 +366,7 @@ pub static OPT9B: Branch = Branch {
 
 /// 7 pulses a turn, modulation index 0.10 to 0.70.
 #[rustfmt::skip]
-pub static OPT7A: Branch = Branch {
+pub static OPP7A: Branch = Branch {
     starts_high: true,
     halves: 3,
     calm: 1,
@@ -443,7 +443,7 @@ pub static OPT7A: Branch = Branch {
 
 /// 7 pulses a turn, modulation index 0.62 to 0.89.
 #[rustfmt::skip]
-pub static OPT7B: Branch = Branch {
+pub static OPP7B: Branch = Branch {
     starts_high: false,
     halves: 3,
     calm: 3,
@@ -487,7 +487,7 @@ pub static OPT7B: Branch = Branch {
 
 /// 7 pulses a turn, modulation index 0.86 to 0.96.
 #[rustfmt::skip]
-pub static OPT7C: Branch = Branch {
+pub static OPP7C: Branch = Branch {
     starts_high: true,
     halves: 3,
     calm: 2,
@@ -514,7 +514,7 @@ pub static OPT7C: Branch = Branch {
 
 /// 7 pulses a turn, modulation index 0.94 to 0.97.
 #[rustfmt::skip]
-pub static OPT7D: Branch = Branch {
+pub static OPP7D: Branch = Branch {
     starts_high: false,
     halves: 6,
     calm: 6,
@@ -534,7 +534,7 @@ pub static OPT7D: Branch = Branch {
 
 /// 7 pulses a turn, modulation index 0.95 to 0.97.
 #[rustfmt::skip]
-pub static OPT7E: Branch = Branch {
+pub static OPP7E: Branch = Branch {
     starts_high: false,
     halves: 5,
     calm: 5,
@@ -553,7 +553,7 @@ pub static OPT7E: Branch = Branch {
 
 /// 5 pulses a turn, modulation index 0.10 to 0.84.
 #[rustfmt::skip]
-pub static OPT5A: Branch = Branch {
+pub static OPP5A: Branch = Branch {
     starts_high: true,
     halves: 2,
     calm: 1,
@@ -644,7 +644,7 @@ pub static OPT5A: Branch = Branch {
 
 /// 5 pulses a turn, modulation index 0.76 to 0.94.
 #[rustfmt::skip]
-pub static OPT5B: Branch = Branch {
+pub static OPP5B: Branch = Branch {
     starts_high: false,
     halves: 2,
     calm: 2,
@@ -679,7 +679,7 @@ pub static OPT5B: Branch = Branch {
 
 /// 5 pulses a turn, modulation index 0.91 to 0.97.
 #[rustfmt::skip]
-pub static OPT5C: Branch = Branch {
+pub static OPP5C: Branch = Branch {
     starts_high: true,
     halves: 2,
     calm: 2,
@@ -702,7 +702,7 @@ pub static OPT5C: Branch = Branch {
 
 /// 3 pulses a turn, modulation index 0.10 to 0.95.
 #[rustfmt::skip]
-pub static OPT3A: Branch = Branch {
+pub static OPP3A: Branch = Branch {
     starts_high: true,
     halves: 1,
     calm: 1,
@@ -804,7 +804,7 @@ pub static OPT3A: Branch = Branch {
 
 /// 3 pulses a turn, modulation index 0.90 to 0.98.
 #[rustfmt::skip]
-pub static OPT3B: Branch = Branch {
+pub static OPP3B: Branch = Branch {
     starts_high: false,
     halves: 1,
     calm: 1,

@@ -138,9 +138,9 @@ fn tell(driven: &[Piece], minutes: f64, json: bool) -> Result<bool> {
     Ok(driven.iter().all(|piece| piece.tripped.is_empty()))
 }
 
-/// Writes cycles.csv of shards that are merged, and prints what `campaign --healthy` prints; `true` if nothing tripped.
+/// Writes campaign.csv of shards that are merged, and prints what `campaign --healthy` prints; `true` if nothing tripped.
 pub fn merged(merged: &Merged, out: &Path, json: bool) -> Result<bool> {
-    write_text(&out.join("cycles.csv"), &merged.csv())?;
+    write_text(&out.join("campaign.csv"), &merged.csv())?;
     let minutes = merged.plan.configuration.get("minutes").and_then(serde_json::Value::as_f64);
     tell(&merged.read()?, minutes.context("a configuration without its minutes")?, json)
 }

@@ -105,9 +105,9 @@ pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// Writes random.csv and prints the coverage; `true` if nothing is uncaught. What is uncaught is made small.
+/// Writes campaign.csv and prints the coverage; `true` if nothing is uncaught. What is uncaught is made small.
 fn finish(merged: &Merged, out: &Path) -> Result<bool> {
-    write_text(&out.join("random.csv"), &merged.csv())?;
+    write_text(&out.join("campaign.csv"), &merged.csv())?;
     let runs = Run::of(merged)?;
     crate::say!("{}", coverage(&runs).trim_end());
     let lost: Vec<_> = runs.iter().filter(|run| run.outcome.verdict == Verdict::Uncaught).collect();

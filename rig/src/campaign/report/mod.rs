@@ -85,14 +85,14 @@ pub fn text(outcomes: &[Outcome]) -> String {
     out
 }
 
-/// Writes cases.csv, summary.json and report.html.
+/// Writes campaign.csv, summary.json and report.html.
 pub fn write(outcomes: &[Outcome], options: serde_json::Value, out: &Path) -> Result<()> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for outcome in outcomes {
         writer.serialize(outcome)?;
     }
     let bytes = writer.into_inner().map_err(|error| error.into_error())?;
-    write_text(&out.join("cases.csv"), &String::from_utf8(bytes)?)?;
+    write_text(&out.join("campaign.csv"), &String::from_utf8(bytes)?)?;
     let totals = SYSTEMS.map(|(system, _)| (system.to_owned(), serde_json::json!(total(outcomes, system))));
     let summary = serde_json::json!({
         "scenario": "campaign",

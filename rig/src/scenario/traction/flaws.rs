@@ -323,6 +323,11 @@ impl FlawOptions {
         self.current_offset.unwrap_or_default().0.map(|percent| percent / 100.0)
     }
 
+    /// By how much the three currents are sampled early, on average, in µs.
+    pub fn mean_skew_us(&self) -> f64 {
+        self.adc_skew_us.unwrap_or_default().0.iter().sum::<f64>() / 3.0
+    }
+
     /// By how much each phase's current is read larger than it is, as shares.
     pub fn gains(&self) -> [f64; 3] {
         self.current_gains.unwrap_or_default().0.map(|percent| percent / 100.0)

@@ -104,12 +104,13 @@ pub enum PatternsName {
 impl TractionOptions {
     /// Age of the angle that the drive is told, in s.
     fn known_late_s(&self) -> f32 {
-        if self.angle_late_known { (1e-6 * self.angle_late_us) as f32 } else { 0.0 }
+        let mean_us = self.angle_late_us - 0.5 * self.flaws.angle_jitter_us;
+        if self.angle_late_known { (1e-6 * mean_us) as f32 } else { 0.0 }
     }
 
-    /// Time constant of the current sensors that the drive is told, in ticks.
+    /// Delay of the currents that the drive is told, in ticks: the sensors' time constant, and by how much all phases together are sampled early.
     fn known_filter_ticks(&self) -> u32 {
-        if self.current_filter_known { ticks(self.current_filter_us) } else { 0 }
+        if self.current_filter_known { ticks(self.current_filter_us + self.flaws.mean_skew_us()) } else { 0 }
     }
 
     /// Mean threshold and slope of the devices that the drive is told, in mV and hundredths of a mΩ.
@@ -201,10 +202,10 @@ pub struct TractionOptions {
     /// Time constant of the current sensors, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
     pub current_filter_us: f64,
-    /// The drive knows of --angle-late-us, as by its power stage's key, and makes up for it.
+    /// The drive knows of --angle-late-us and of the mean of --angle-jitter-us, as by its power stage's key, and makes up for them.
     #[arg(long)]
     pub angle_late_known: bool,
-    /// The drive knows of --current-filter-us, as by its power stage's key, and makes up for it.
+    /// The drive knows of --current-filter-us and of the mean of --adc-skew-us, as by its power stage's key, and makes up for them.
     #[arg(long)]
     pub current_filter_known: bool,
     /// The true machine, where it is not the one that control knows: a folder of tables/, or the path of any machine folder.
@@ -354,7 +355,11 @@ impl System for Traction {
                 "--current-filter-us",
                 options.own.current_filter_us,
                 0.0,
-                if options.own.current_filter_known { most_known_us } else { 1e4 },
+                if options.own.current_filter_known {
+                    most_known_us - options.own.flaws.mean_skew_us()
+                } else {
+                    1e4
+                },
             ),
         ])?;
         if (options.law, PatternsName::of(&options.own, machine), options.on)
@@ -433,8 +438,16 @@ fn filled(options: &Options, machine: &Machine) -> Options {
     let beside = Beside { udc_gain, current_filter_us, angle_deg: [angle_1f_deg, angle_2f_deg] };
     let Filled { run, beside, flaws } = Filled::of(&options.run, beside, &own.flaws, machine);
     let Beside { udc_gain, current_filter_us, angle_deg: [angle_1f_deg, angle_2f_deg] } = beside;
-    let own =
-        TractionOptions { udc_gain, current_filter_us, angle_1f_deg, angle_2f_deg, flaws, ..own.clone() };
+    let own = TractionOptions {
+        udc_gain,
+        current_filter_us,
+        current_filter_known: true,
+        angle_late_known: true,
+        angle_1f_deg,
+        angle_2f_deg,
+        flaws,
+        ..own.clone()
+    };
     Options { run, own }
 }
 

@@ -1,6 +1,6 @@
 //! The control law's part of a period: what the newest boundary teaches, the operating point, the command.
 
-use super::super::applied::{Steady, Wanted, committed, follows, limits, passed};
+use super::super::applied::{Ahead, Steady, Wanted, committed, follows, interval_s, limits, passed};
 use super::super::current_delay::CurrentDelay;
 use super::super::pulses::Half;
 use super::super::slot::Slot;
@@ -38,6 +38,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
             self.delay = self.delayed();
+            self.look_ahead(input.sample.udc_v, slot);
         }
         // Once a half, and not in the longest periods unless all are.
         if slot.commands && (!aims || slot.between > 0) {
@@ -55,6 +56,25 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
         if commands {
             self.command(input.sample, &here, slot);
+        }
+    }
+
+    /// Follows the link's ripple and, where the command comes next, looks ahead to the halves that it counts and makes.
+    #[inline(always)]
+    fn look_ahead(&mut self, udc_v: f32, slot: &Slot) {
+        let clock = &self.settings.clock;
+        self.ripple.step(udc_v, clock.seconds(slot.now.since(self.link_seen)));
+        self.link_seen = slot.now;
+        if let Some(newest) = self.pulses.newest()
+            && (slot.aims || slot.commands)
+        {
+            let first_s = if slot.commands { 0.0 } else { clock.control_s };
+            let begins = slot.key.boundary.after(newest.half.period_ticks);
+            let horizon_s = clock.seconds(begins.since(slot.now));
+            let interval_s = interval_s(slot.key.mode, self.controller.omega(), &self.settings);
+            let middles_s = [0.5 * (first_s + horizon_s), horizon_s + 0.5 * interval_s];
+            let [committed_v, next_v] = self.ripple.change(first_s, middles_s);
+            self.ahead = Ahead { committed_v, next_v };
         }
     }
 
@@ -123,6 +143,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             demand: &demand,
             window,
             udc_v,
+            change_v: self.ahead.next_v,
             link_scale: self.link_scale,
             swing,
             limits: &self.limits,
@@ -141,11 +162,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let Settings { gains, clock, .. } = &self.settings;
         // The instant of the currents.
         let now = slot.now.before(self.delay.ticks);
-        let (omega, udc_v) = (self.controller.omega(), sample.udc_v * self.link_scale);
+        let Ahead { committed_v, next_v } = self.ahead;
+        let omega = self.controller.omega();
+        let udc_v = (sample.udc_v + next_v) * self.link_scale;
         let steady =
             Steady { omega, udc_v, voltage_v: self.steady_v, modulation_index: self.modulation_index };
         let (mode, revises) = (slot.key.mode, self.revises);
-        let wanted = Wanted { mode, revises, between: slot.between, before: &self.reference };
+        let committed_v = (sample.udc_v + committed_v) * self.link_scale;
+        let wanted =
+            Wanted { mode, revises, between: slot.between, before: &self.reference, udc_v: committed_v };
         let committed = committed(&self.pulses, now, &steady, &self.settings, &wanted);
         let law = Law { gains, clock, tables: self.machine.tables() };
         let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
@@ -206,6 +231,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.mode = Mode::Off;
         self.exit.rest(self.settings.clock.control_s());
         self.damper = LinkDamper::at(measured.udc_v);
+        self.ripple.step(measured.udc_v, self.settings.clock.seconds(now.since(self.link_seen)));
+        (self.link_seen, self.ahead) = (now, Ahead::NONE);
         self.reference = Reference {
             carrier_angle: measured.angle,
             rate: self.settings.clock.angle_rate(omega),

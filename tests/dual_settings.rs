@@ -1,0 +1,72 @@
+//! Settings of the ZS9's drive: the numbers that follow from clock, carrier and ratings.
+
+use tractive::built_in::zs9::BUILT_IN;
+use tractive::control::{Gains, SpeedDesign, ZSourceDesign};
+use tractive::drive::dual::Settings;
+use tractive::machine::Ratings;
+use tractive::time::Clock;
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+
+#[test]
+fn loops_are_designed_for_the_control_period_and_for_two_motors_in_turn() {
+    let settings = Settings::new(CLOCK, 2_500);
+    let wanted = Gains {
+        carrier: 0.6,
+        observer: 0.04,
+        sixth_turn_rad: 2.0 * Gains::DEFAULT.sixth_turn_rad,
+        resistance_from: 4.0,
+        ..Gains::DEFAULT
+    };
+    assert_eq!(format!("{:?}", settings.gains), format!("{wanted:?}"));
+    let ZSourceDesign { period_s, inner_hz, outer_hz, .. } = settings.link;
+    assert_eq!((period_s, inner_hz, outer_hz), (1e-4, 700.0, 150.0));
+    assert_eq!(settings.link, ZSourceDesign { period_s, inner_hz, outer_hz, ..ZSourceDesign::ZS9 });
+    assert_eq!(settings.link_gains, settings.link.gains());
+    let speed = SpeedDesign { inertia_kg_m2: 0.1, natural_rad_s: 280.0, period_s: 2e-4 };
+    assert_eq!(settings.speed, speed);
+    let limits = settings.limits;
+    assert_eq!((limits.source_min_v, limits.capacitor_max_v, limits.duty_max), (280.0, 720.0, 0.3));
+}
+
+#[test]
+fn gains_of_the_network_are_those_of_its_bandwidths() {
+    use std::f32::consts::TAU;
+    let gains = ZSourceDesign::ZS9.gains();
+    let near = |got: f32, wanted: f32| assert!((got / wanted - 1.0).abs() < 1e-6, "{got} {wanted}");
+    near(gains.inner_ohm, TAU * 600.0 * 0.5e-3);
+    near(gains.outer_s, TAU * 80.0 * 500e-6);
+    near(gains.integral_share, 0.25 * TAU * 80.0 * 100e-6);
+}
+
+#[test]
+fn instants_are_those_of_the_carrier() {
+    for (carrier_ticks, dead_time_ticks, peak, deadline, half, pause) in
+        [(2_500, 0, 1_250, 1_250, 40_000, 36_000), (1_250, 10, 625, 1_875, 20_000, 15_680)]
+    {
+        let settings = Settings { dead_time_ticks, ..Settings::new(CLOCK, carrier_ticks) };
+        let got = [
+            settings.first_peak_ticks(),
+            settings.deadline_ticks(),
+            settings.half_steps(),
+            settings.longest_pause_steps(),
+        ];
+        assert_eq!(got, [peak, deadline, half, pause]);
+    }
+}
+
+/// Links of machines as capacitors: by what two levels make of them, and the lowest by what is charged.
+#[test]
+fn the_operator_looks_at_capacitors() {
+    let settings = Settings::new(CLOCK, 2_500);
+    let two_level = std::f32::consts::FRAC_PI_4 / 3_f32.sqrt();
+    let ratings = settings.operator_ratings(&BUILT_IN.ratings);
+    let own = &BUILT_IN.ratings;
+    let near = |got: f32, wanted: f32| assert!((got / wanted - 1.0).abs() < 1e-6, "{got} {wanted}");
+    near(ratings.dc_link_min_v, 0.9 * own.dc_link_min_v / two_level);
+    near(ratings.dc_link_nominal_v, own.dc_link_nominal_v / two_level);
+    near(ratings.dc_link_max_v, own.dc_link_max_v / two_level);
+    assert_eq!((ratings.trip_dc_over_v, ratings.trip_dc_under_v), (720.0, 140.0));
+    let links = Ratings { dc_link_min_v: 360.0, dc_link_max_v: 600.0, dc_link_nominal_v: 500.0, ..*own };
+    assert_eq!(Settings::link_range_v(&links), [400.0, 800.0, 600.0]);
+}
