@@ -227,9 +227,9 @@ impl Course {
         } else if self.commands <= QUIET {
             self.waited = 0;
         } else if moved {
-            // Against its voltage goes no machine's current: then the guess by which it has moved is the better one.
+            // Against its voltage goes no machine's current: then the guess by which it has moved is the better one. It is of no place yet.
             if change.d * seen.acted.d > 0.0 {
-                inductance.learn(change, seen.acted, NOISE_SHARE * bound_a);
+                inductance.adapt(change, seen.acted, NOISE_SHARE * bound_a);
             }
             inductance.settle();
             (self.commands, self.step) = (0, 1);

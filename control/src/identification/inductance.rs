@@ -190,9 +190,17 @@ impl Inductance {
         Dq { d: qq * flux.d - dq * flux.q, q: dd * flux.q - dq * flux.d } * (1.0 / determinant)
     }
 
-    /// A change of current was seen to take so much flux linkage; changes of so little, in A, are noise. The matrix moves by the least
-    /// that explains a share of it, the coupling less readily than the rest.
+    /// A change of current was seen here to take so much flux linkage; changes of so little, in A, are noise. It is remembered where it was.
     pub fn learn(&mut self, change: Dq, flux: Dq, noise_a: f32) {
+        let before = self.here;
+        self.adapt(change, flux, noise_a);
+        let Matrix { dd, dq, qq } = self.here;
+        self.remember(before, Matrix { dd: dd - before.dd, dq: dq - before.dq, qq: qq - before.qq });
+    }
+
+    /// What [`Self::learn`] makes of the present inductance, wherever it holds: the matrix moves by the least that explains a share of what
+    /// was seen, the coupling less readily than the rest.
+    pub fn adapt(&mut self, change: Dq, flux: Dq, noise_a: f32) {
         let left = flux - self.flux(change);
         let (Dq { d, q }, Dq { d: left_d, q: left_q }) = (change, left);
         // With x = (dd, dq, qq) and the coupled share s: flux_d = d x₀ + s q x₁, flux_q = s d x₁ + q x₂.
@@ -212,7 +220,6 @@ impl Inductance {
         let most = COUPLING * dd * qq;
         let dq = if dq * dq > most { dq * (most / (dq * dq)) } else { dq };
         self.here = Matrix { dd, dq, qq };
-        self.remember(before, Matrix { dd: dd - before.dd, dq: dq - before.dq, qq: qq - before.qq });
     }
 
     /// Adds to the four points around what makes so much more here, each by its nearness.
