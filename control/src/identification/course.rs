@@ -202,8 +202,13 @@ impl Course {
         self.zero.turn(back_share, mean.d / bound_a, seen.length_s);
         let drop = self.drop_v(mean, seen.frame);
         let learns = change.squared() > (LEARNT_SHARE * bound_a) * (LEARNT_SHARE * bound_a);
-        if learns && !matches!(self.stage, Stage::Probe | Stage::Turn) {
-            inductance.learn(change, seen.acted - drop * seen.length_s, NOISE_SHARE * bound_a);
+        let (flux, noise_a) = (seen.acted - drop * seen.length_s, NOISE_SHARE * bound_a);
+        match self.stage {
+            Stage::Probe | Stage::Turn => {}
+            // Direct currents: one inductance follows them.
+            Stage::Staircase if learns => inductance.adapt(change, flux, noise_a),
+            _ if learns => inductance.learn(change, flux, noise_a),
+            _ => {}
         }
         let [along_d, along_q] = match self.stage {
             Stage::Done if self.step > 0 => [0.0; 2],

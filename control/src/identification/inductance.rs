@@ -227,21 +227,24 @@ impl Inductance {
         let Place { point, column, d, q } = self.place;
         let (inner, lower) = (1.0 - q, 1.0 - d);
         let per = 1.0 / ((inner * inner + q * q) * (lower * lower + d * d));
-        let mut add = |point: usize, outward: usize, share: f32| {
-            let (point, column) = (point + outward, column + outward);
-            let unseen = if outward > 0 { before.times(OUTWARD) } else { before };
-            let known = self.known(point, column).unwrap_or(unseen).with(more, per * share, self.floor_h);
+        let corners = [
+            (point, column, inner * lower),
+            (point + 1, column + 1, q * lower),
+            (point + ALONG_Q, column, inner * d),
+            (point + ALONG_Q + 1, column + 1, q * d),
+        ];
+        let known = corners.map(|(point, beside, share)| {
+            let unseen = if beside > column { before.times(OUTWARD) } else { before };
+            self.known(point, beside).unwrap_or(unseen).with(more, per * share, self.floor_h)
+        });
+        for ((point, column, _), known) in corners.into_iter().zip(known) {
             if let Some(remembered) = self.points.get_mut(point) {
                 *remembered = Some(known);
             }
             if let Some(newest) = self.along_q.get_mut(column) {
                 *newest = Some(known);
             }
-        };
-        add(point, 0, inner * lower);
-        add(point, 1, q * lower);
-        add(point + ALONG_Q, 0, inner * d);
-        add(point + ALONG_Q, 1, q * d);
+        }
     }
 }
 
