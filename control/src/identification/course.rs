@@ -105,7 +105,7 @@ const REST: u32 = 16;
 /// known from the one before it.
 const FIRST_BOUND: f32 = 0.2;
 const WIDENING_D: f32 = 0.006;
-const WIDENING_Q: f32 = 0.002;
+const WIDENING_Q: f32 = 0.003;
 
 /// Current along d beside the pulses along q and of the turning rotor, as a share of the bound: no phase is without current for long. Beside
 /// the last pulses it goes to and fro between two shares. Ways in a command, at first and growing by as much with each command: no two ways
