@@ -243,3 +243,36 @@ fn a_pattern_that_takes_over_from_another_stands_on_the_same_centre() {
         }
     }
 }
+
+/// Gates that go off between the last half of a pattern and the first of another leave nothing for the pattern that begins later.
+#[test]
+fn a_pattern_begins_alike_whatever_was_under_way_when_the_gates_went_off() {
+    const UDC_V: f32 = 1500.0;
+    let play = |modulator: &mut Modulator, from: Instant, index: f32, halves: u32| {
+        let mut now = from;
+        let mut step = |_| {
+            let turned = Angle((f64::from(rate(110.0)) * f64::from(now.0)) as u64 as u32);
+            let voltage_v = index * UDC_V * std::f32::consts::FRAC_2_PI;
+            let half =
+                modulator.step(now, Some(&Reference::turning(voltage_v, turned, rate(110.0), now, UDC_V)));
+            now = now.after(half.period_ticks);
+            half
+        };
+        (0..halves).map(&mut step).collect::<Vec<_>>()
+    };
+    let begun_after = |halves: u32| {
+        let mut modulator = Modulator::new(devices(), Schedule::new(&CLOCK));
+        let before = play(&mut modulator, Instant(0), 0.88, 200);
+        let end = before.iter().fold(Instant(0), |now, half| now.after(half.period_ticks));
+        let modes = play(&mut modulator, end, 0.95, halves);
+        modulator.rest(Instant(4_000_000), None);
+        let changes = modes.windows(2).any(|pair| pair[0].mode != pair[1].mode);
+        (changes, play(&mut modulator, Instant(5_000_000), 0.95, 40))
+    };
+    let (_, usual) = begun_after(0);
+    assert!(usual.iter().any(|half| half.mode == Mode::Mid3));
+    for halves in 1..80 {
+        assert!(begun_after(halves).1 == usual, "after {halves} halves");
+    }
+    assert!(begun_after(79).0, "the pattern never changed");
+}

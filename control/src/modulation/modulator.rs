@@ -133,6 +133,7 @@ impl Modulator {
     pub fn rest(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierHalf {
         self.mode = Mode::Off;
         self.plan = None;
+        self.late_ticks = 0.0;
         let mut half = CarrierHalf::off(self.devices.shortest_half_ticks);
         if let Some(reference) = reference {
             let seen = if reference.rate < 0.0 { reference.mirrored() } else { *reference };
