@@ -91,6 +91,8 @@ fn scales_are_those_of_the_maps_flux_linkage_with_the_magnets_loss() {
         Dq { d: -60.0, q: -70.0 },
         Dq { d: -20.0, q: 5.0 },
         Dq { d: -150.0, q: 20.0 },
+        // The least i_q that tells.
+        Dq { d: -60.0, q: 1e-3 * tables.ratings.max_current_a },
     ] {
         let flux = flux_linkage(&tables, current);
         let torque = torque_nm(&tables, flux - less, current) / torque_nm(&tables, flux, current);

@@ -263,4 +263,89 @@ mod tests {
         let left_rad = worst(&left(1_257.0, 0.0, 3.0, [(0.3, 0.0), (0.0, 0.0)]));
         assert!(left_rad < 0.35, "{left_rad} rad");
     }
+
+    /// A tracker that has seen two angles half a radian apart, in so long a time: its speed is theirs.
+    fn tracker(period_s: f32, natural_rad_s: f32) -> SpeedTracker {
+        let mut tracker = SpeedTracker::with_natural(natural_rad_s);
+        for rad in [0.0, 0.5] {
+            tracker.step(Angle::within_half_turn(rad), period_s);
+        }
+        tracker
+    }
+
+    /// Four turns of 16 samples with an error of the second part alone, or of the first.
+    fn four_turns(harmonics: &mut AngleHarmonics, tracker: &SpeedTracker, second: bool) {
+        for sample in 1..=64_u32 {
+            let angle = Angle(sample.wrapping_mul(1 << 28));
+            let direction = angle.sin_cos();
+            let of = if second { direction.turned(direction) } else { direction };
+            harmonics.observe(angle, direction, 0.01 * of.cos, tracker);
+        }
+    }
+
+    #[test]
+    fn what_is_measured_across_a_pause_is_not_learnt() {
+        let tracker = tracker(0.5e-3, 500.0);
+        for second in [false, true] {
+            let (mut harmonics, mut paused) = (AngleHarmonics::new(0.0), AngleHarmonics::new(0.0));
+            for harmonics in [&mut harmonics, &mut paused] {
+                four_turns(harmonics, &tracker, second);
+                assert!(!harmonics.used, "it was no beginning");
+            }
+            paused.pause();
+            for harmonics in [&mut harmonics, &mut paused] {
+                four_turns(harmonics, &tracker, second);
+            }
+            assert_eq!((harmonics.used, paused.used), (true, false), "{second}");
+            four_turns(&mut paused, &tracker, second);
+            assert!(paused.used, "the next whole turns count");
+        }
+    }
+
+    #[test]
+    fn below_its_share_of_the_trackers_frequency_nothing_is_learnt() {
+        // 1,000 rad/s: above 0.4 of 2,000, and below 0.4 of 3,000, in rad/s. There it is.
+        let omega = tracker(0.5e-3, 0.0).omega();
+        let border = (0..1 << 23).map(|bits| f32::from_bits(2_048_f32.to_bits() + bits));
+        let border = border.into_iter().find(|natural| FROM * natural == omega).unwrap();
+        for (natural_rad_s, learns) in [(2_000.0, true), (border, false), (3_000.0, false)] {
+            let (tracker, mut harmonics) = (tracker(0.5e-3, natural_rad_s), AngleHarmonics::new(0.0));
+            four_turns(&mut harmonics, &tracker, false);
+            four_turns(&mut harmonics, &tracker, false);
+            assert_eq!(harmonics.used, learns, "{natural_rad_s} rad/s");
+        }
+        assert!(!AngleHarmonics::can_observe(&SpeedTracker::with_natural(0.0)), "at rest");
+    }
+
+    #[test]
+    fn an_error_as_large_as_what_is_left_alone_is_left_alone() {
+        for (cos, used) in [(LEFT_ALONE_RAD, false), (1.001 * LEFT_ALONE_RAD, true)] {
+            let tracker = tracker(0.5e-3, 500.0);
+            let part = Part { cos, sin: 0.0 };
+            let mut harmonics =
+                AngleHarmonics { known: [part, Part::NONE], used: true, ..AngleHarmonics::new(0.0) };
+            (harmonics.omega, harmonics.samples) = (tracker.omega(), 1);
+            harmonics.end(&tracker);
+            assert_eq!(harmonics.used, used, "{cos} rad");
+        }
+    }
+
+    #[test]
+    fn a_speed_that_changed_by_a_fiftieth_is_not_even() {
+        // Where the change is the border itself, as it is computed.
+        let periods = (0..4_000_u32).map(|bits| f32::from_bits(0.5e-3_f32.to_bits() + bits));
+        let found = periods.into_iter().find_map(|period_s| {
+            let after = tracker(period_s, 500.0).omega();
+            let before = after - EVEN * after;
+            (after - before == EVEN * after).then_some((period_s, before))
+        });
+        let (period_s, before) = found.unwrap();
+        for (omega, even) in [(before, false), (0.5 * (before + tracker(period_s, 500.0).omega()), true)] {
+            let mut harmonics = AngleHarmonics::new(0.0);
+            (harmonics.omega, harmonics.samples) = (omega, 1);
+            harmonics.sums[0].cos = 0.01;
+            harmonics.end(&tracker(period_s, 500.0));
+            assert_eq!(harmonics.used, even, "from {omega} rad/s");
+        }
+    }
 }

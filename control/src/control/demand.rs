@@ -147,6 +147,7 @@ mod tests {
         };
         for (udc_v, motoring, braking) in [
             (850.0, 0.1, 100.0),
+            (900.05, 0.1, 100.0),
             (950.0, 50.0, 100.0),
             (1500.0, 100.0, 100.0),
             (1850.0, 100.0, 50.0),
@@ -154,8 +155,11 @@ mod tests {
         ] {
             assert_eq!(window.bounds_nm(udc_v, 100.0, 300.0), (-braking, motoring), "{udc_v} V forward");
             assert_eq!(window.bounds_nm(udc_v, 100.0, -300.0), (-motoring, braking), "{udc_v} V backward");
+            assert_eq!(window.bounds_nm(udc_v, 100.0, 0.0), (-braking, motoring), "{udc_v} V at rest");
         }
-        assert_eq!(LinkWindow::OPEN.bounds_nm(1e6, 100.0, 300.0), (-100.0, 100.0));
+        for udc_v in [0.0, 1e6, f32::MAX] {
+            assert_eq!(LinkWindow::OPEN.bounds_nm(udc_v, 100.0, 300.0), (-100.0, 100.0), "{udc_v} V");
+        }
     }
 
     #[test]
@@ -188,7 +192,7 @@ mod tests {
         let slew_nm = ratings.torque_slew_nm_s * 1e-4;
         for sign in [1.0, -1.0] {
             // The diodes rectify into a link below the EMF: that goes on from where it is.
-            for share in [0.02, 0.05, 0.3] {
+            for share in [LEAKAGE_SHARE, 0.02, 0.05, 0.3] {
                 let flowing_nm = sign * share * ratings.max_torque_nm;
                 assert_eq!(begins_nm(flowing_nm, false), flowing_nm - sign * slew_nm, "{share}");
                 assert_eq!(begins_nm(flowing_nm, true), 0.0, "a carrier can step");

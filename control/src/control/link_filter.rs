@@ -57,3 +57,21 @@ impl LinkFilter {
         self.lowest_v
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A link that stands at 1,000 V and then is this high, with a volt more to come: the voltage that may be used.
+    fn usable_v(udc_v: f32) -> f32 {
+        let mut filter = LinkFilter::new();
+        filter.step(1_000.0, 0.0, 0.0);
+        filter.step(udc_v, 1.0, 0.0).usable_v
+    }
+
+    #[test]
+    fn only_beyond_the_border_a_link_has_jumped() {
+        let border_v = JUMPED.0 * 1_000.0;
+        assert_eq!([usable_v(border_v), usable_v(border_v + 0.1)], [border_v + 1.0, 1_000.0]);
+    }
+}

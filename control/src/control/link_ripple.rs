@@ -143,4 +143,14 @@ mod tests {
         }
         assert_eq!(ripple.change(0.0, [1e-3]), [0.0]);
     }
+
+    #[test]
+    fn a_quarter_off_all_begins_anew() {
+        for (udc_v, anew) in [(1_250.0, true), (750.0, true), (1_249.0, false), (751.0, false)] {
+            let mut ripple = LinkRipple::at(1_000.0);
+            ripple.step(udc_v, PERIOD_S);
+            assert_eq!(ripple.mean_v == udc_v, anew, "{udc_v} V");
+            assert_eq!(ripple.change(0.0, [1e-3]) == [0.0], anew, "{udc_v} V");
+        }
+    }
 }

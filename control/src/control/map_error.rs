@@ -232,4 +232,12 @@ mod tests {
         let told = estimate(0.1, 0.0, Dq::default(), 300.0);
         assert!((told - 0.1).abs() < 1e-3, "{told}");
     }
+
+    #[test]
+    fn the_lowest_speed_that_tells_is_its_border() {
+        let border = 0.15 * (FROM * 1_500.0);
+        for (omega, tells) in [(border, true), (-border, true), (0.999 * border, false)] {
+            assert_eq!(estimate(0.1, 0.0, CURRENT, omega) != 0.0, tells, "{omega} rad/s");
+        }
+    }
 }

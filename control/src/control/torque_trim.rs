@@ -147,4 +147,23 @@ mod tests {
             );
         }
     }
+
+    /// A demand that changes by just the largest torque in a second is not yet steep.
+    #[test]
+    fn the_border_of_a_steep_ramp_is_not_steep() {
+        let mut trim = TorqueTrim::new();
+        for period in 0..64_u8 {
+            let demand_nm = f32::from(period);
+            trim.step(&Input {
+                demand_nm,
+                measured_nm: 0.0,
+                limited: false,
+                short: false,
+                ripple_share: RIPPLE_SHARE,
+                largest_nm: 1_024.0,
+                period_s: 1.0 / 1_024.0,
+            });
+        }
+        assert!(trim.curvature > 0.0);
+    }
 }
