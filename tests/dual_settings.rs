@@ -30,6 +30,12 @@ fn loops_are_designed_for_the_control_period_and_for_two_motors_in_turn() {
 }
 
 #[test]
+fn another_control_period_is_that_of_every_loop() {
+    let settings = Settings::new(Clock::new(25_000_000, 5_000), 2_500);
+    assert_eq!([settings.link.period_s, settings.speed.period_s], [2e-4, 4e-4]);
+}
+
+#[test]
 fn gains_of_the_network_are_those_of_its_bandwidths() {
     use std::f32::consts::TAU;
     let gains = ZSourceDesign::ZS9.gains();

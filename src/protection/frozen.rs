@@ -149,3 +149,29 @@ impl Default for FrozenWatch {
         Self::new()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+    use crate::frames::{Abc, Angle};
+
+    /// A turn, a push and a rotor that are no more than what may be are not frozen.
+    #[test]
+    fn at_its_borders_nothing_is_frozen() {
+        let (ratings, none) = (&BUILT_IN.ratings, AlphaBeta { alpha: 0.0, beta: 0.0 });
+        let flux_wb = ratings.max_torque_nm / (1.5 * ratings.pole_pairs * ratings.max_current_a);
+        for (more, found) in [(1.0, false), (1.001, true)] {
+            let turned = Repeated { turned_rad: TURNED_SHARE * more, ..Repeated::since(none) };
+            assert_eq!(turned.is_suspicious(ratings.max_current_a, ratings), found);
+            let pushed_wb = AlphaBeta { alpha: PUSHED_SHARE * flux_wb * more, beta: 0.0 };
+            let pushed = Repeated { pushed_wb, ..Repeated::since(none) };
+            assert_eq!(pushed.is_suspicious(0.0, ratings), found);
+            let mut watch = FrozenWatch::new();
+            let measured = Measurements { currents_a: Abc::default(), udc_v: 1_500.0, angle: Angle::ZERO };
+            watch.last = Some((measured.currents_a, measured.angle));
+            watch.turned_rad = FROZEN_TURN_RAD * more;
+            assert_eq!(watch.check(&measured, 0.0, 1e-4, ratings).is_some(), found);
+        }
+    }
+}

@@ -55,3 +55,20 @@ impl LegFaults {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+
+    /// A link that trips at the EMF itself does not stand it.
+    #[test]
+    fn the_link_stands_an_emf_below_its_trip_alone() {
+        let legs = LegFaults { blocked: 0b11, ..LegFaults::default() };
+        for (more, safe) in [(1.0, SafeState::ShortCircuit), (1.001, SafeState::GatesOff)] {
+            let trip_dc_over_v = emf_v(500.0, &BUILT_IN.ratings) * more;
+            let ratings = Ratings { trip_dc_over_v, ..BUILT_IN.ratings };
+            assert_eq!(legs.in_place_of(SafeState::ShortCircuit, 500.0, &ratings), safe, "{more}");
+        }
+    }
+}

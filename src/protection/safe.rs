@@ -114,3 +114,22 @@ fn standing_v(udc_v: f32, ratings: &Ratings) -> f32 {
 pub(super) fn emf_v(omega: f32, ratings: &Ratings) -> f32 {
     omega.abs() * SQRT_3 * ratings.magnet_flux_wb
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+
+    /// After a turn of current it is not yet the short circuit, after more than one it is.
+    #[test]
+    fn gates_that_are_off_wait_for_a_whole_turn() {
+        let ratings = &BUILT_IN.ratings;
+        let currents_a = Abc { a: ratings.max_current_a, b: -ratings.max_current_a, c: 0.0 };
+        for (period_s, shorted) in [(0.0, None), (1e-3, Some(SafeState::ShortCircuit))] {
+            let open = OpenGates { currents_a, udc_v: 500.0, omega: ratings.max_speed_rad_s, period_s };
+            let mut watch = DiodeWatch { turned_rad: core::f32::consts::TAU };
+            let got = watch.step(SafeState::GatesOff, &open, &LegFaults::default(), ratings);
+            assert_eq!(got, shorted, "{period_s} s");
+        }
+    }
+}

@@ -171,4 +171,21 @@ mod tests {
             }
         }
     }
+
+    /// What rounding makes of a rating is that rating, up to its border and no further.
+    #[test]
+    fn rounding_is_forgiven_up_to_its_border() {
+        let border = 1_000.0 * (1.0 + STEP_SHARE);
+        assert_eq!([beyond(border, 750.0, 1_000.0), beyond(1_000.2, 750.0, 1_000.0)], [750.0, 1_000.2]);
+        let ratings = &BUILT_IN.ratings;
+        let border = ratings.max_speed_rad_s * (1.0 + STEP_SHARE);
+        let near = (border * RPM_PER_RAD_S).to_bits();
+        let rpm = (near - 8..near + 8).map(f32::from_bits).find(|rpm| rpm / RPM_PER_RAD_S == border);
+        for (speed_limit_rpm, told) in
+            [(rpm.unwrap(), border), (0.999_97 * rpm.unwrap(), ratings.max_speed_rad_s)]
+        {
+            let parameters = Parameters { speed_limit_rpm, ..Parameters::rated(ratings) };
+            assert_eq!(motor_limits(None, &parameters, ratings).speed_rad_s, told);
+        }
+    }
 }

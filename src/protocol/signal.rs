@@ -214,3 +214,16 @@ impl Signal {
         (if steps < 0.0 { steps - 0.5 } else { steps + 0.5 }) as i32
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_physical_value_is_signed_where_it_can_be_negative() {
+        for (min, signed) in [(-1.0, true), (0.0, false), (1.0, false)] {
+            let Signal { kind, .. } = Signal::physical("X", "V", 0, 0.1, [min, 100.0]);
+            assert_eq!(matches!(kind, Kind::Signed), signed, "from {min}");
+        }
+    }
+}

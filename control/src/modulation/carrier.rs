@@ -129,4 +129,18 @@ mod tests {
         let shares = on_shares(AlphaBeta { alpha: 0.5, beta: 0.288_7 }, 0.5);
         assert!((shares.a - 1.0).abs() < 1e-3 && shares.c.abs() < 1e-3, "{shares:?}");
     }
+
+    /// What is as near to one as to the other is a pulse, and what is as long as the shortest one may be is too, if the pause is.
+    #[test]
+    fn a_pulse_of_just_half_the_shortest_is_made() {
+        for (on, period, min_pulse, got) in [
+            (5.0, 100, 20, 10),
+            (95.0, 100, 20, 90),
+            (10.0, 100, 20, 10),
+            (90.0, 100, 20, 90),
+            (10.0, 15, 20, 5),
+        ] {
+            assert_eq!(whole_pulse(on / period as f32, period, min_pulse), got, "{on} of {period}");
+        }
+    }
 }

@@ -136,4 +136,11 @@ mod tests {
         assert!((f64::from(beta7) - exact7).abs() < 1e-6);
         assert_eq!(half_notch_rad(Mode::Mid3, 2000.0, 1500.0), 0.0);
     }
+
+    #[test]
+    fn square_wave_is_whole_above_its_border_alone() {
+        let border_v = WHOLE * six_step_v(1_500.0);
+        assert!(zero_rad(Mode::Square, border_v, 1_500.0) > 0.0);
+        assert_eq!(zero_rad(Mode::Square, border_v * 1.000_001, 1_500.0), 0.0);
+    }
 }

@@ -354,4 +354,39 @@ mod tests {
             }
         }
     }
+
+    /// With halves of 2¹⁴ ticks a share of the highest switching frequency is a rate to the bit.
+    #[test]
+    fn at_a_border_of_frequency_it_has_been_passed() {
+        let devices = SwitchLimits { min_pulse_ticks: 250, dead_time_ticks: 0, shortest_half_ticks: 1 << 14 };
+        let at = |share: f32| Reference { rate: share * 131_072.0, udc_v: 1_500.0, ..Reference::NONE };
+        let (up, down) = Mode::Async.row().until.shares;
+        let clock = Clock::new(25_000_000, 2_500);
+        for (mode, border) in [(Mode::Async, up), (Mode::Sync15, down)] {
+            for (share, wanted) in [(border, false), (border * 0.999_999, true)] {
+                let got = Schedule::new(&clock).wanted(Instant(0), mode, &at(share), &devices);
+                assert_eq!(got == Mode::Async, wanted, "{mode:?} at {share}");
+            }
+        }
+    }
+
+    /// At its borders a carrier no longer catches.
+    #[cfg(feature = "optimal")]
+    #[test]
+    fn a_carrier_catches_below_its_borders_alone() {
+        let devices = SwitchLimits { min_pulse_ticks: 250, dead_time_ticks: 0, shortest_half_ticks: 1 << 14 };
+        let clock = Clock::new(25_000_000, 2_500);
+        for (index, share, catches) in
+            [(0.84, 0.19, Mode::Async), (0.85, 0.19, Mode::Mid3), (0.84, 0.2, Mode::Mid3)]
+        {
+            let seen = Reference {
+                rate: share * 131_072.0,
+                udc_v: 1_500.0,
+                modulation_index: index,
+                ..Reference::NONE
+            };
+            let mut schedule = Schedule::on(Ladder::OPTIMAL, &clock);
+            assert_eq!(schedule.wanted(Instant(0), Mode::Off, &seen, &devices), catches, "{index} {share}");
+        }
+    }
 }

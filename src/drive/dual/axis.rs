@@ -300,4 +300,23 @@ mod tests {
             assert_eq!(noticed_s(100.0, |t_s| 100.0 + rad_s2 * t_s), None, "{rad_s2} rad/s²");
         }
     }
+
+    /// A jump of the angle is told by its size, and a sensor that is trusted may jump; a lost angle's speed is known anew only after a while.
+    #[test]
+    fn a_jump_of_the_angle_is_told_unless_it_is_trusted() {
+        for (jump_rad, trusted, told) in [(1.0, false, true), (-1.0, false, true), (1.0, true, false)] {
+            let mut axis = Axis::new(Controller::with_tracking(TRACKING_RAD_S));
+            let turn = |period: u16| Angle::within_half_turn(0.01 * f32::from(period % 300));
+            for period in 0..300 {
+                assert_eq!(axis.track(turn(period), false, &SETTINGS), None);
+            }
+            let jumped = turn(299) + Angle::within_half_turn(0.01 + jump_rad);
+            let got = axis.track(jumped, trusted, &SETTINGS);
+            assert_eq!(got.is_some(), told, "{jump_rad} {trusted}: {got:?}");
+            assert!(got.is_none_or(|got| (got - jump_rad).abs() < 1e-3), "{got:?}");
+            assert!(axis.speed_is_known());
+            axis.recover_angle();
+            assert_eq!(axis.speed_is_known(), !told, "{jump_rad} {trusted}");
+        }
+    }
 }

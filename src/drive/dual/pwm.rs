@@ -298,3 +298,56 @@ fn refusal(refused: Refused, request: &Request) -> FailedCheck {
         Refused::ShootThrough => (Fault::DutyRange, request.shoot_through, 1.0),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::zs9::BUILT_IN;
+    use crate::nine_switch::GateTicks as Pause;
+    use crate::time::Clock;
+
+    /// Of pauses at each border: what must be on, what may be on, what is off.
+    #[test]
+    fn what_a_gate_must_show_goes_by_the_length_of_its_pause() {
+        let (half, longest) = (1_000, 900);
+        let pauses = [0, 1, longest - 1, longest, longest + 1, half - 1, half, 0, half];
+        let gates = pauses.map(|pause| Pause { off_from: 0, off_to: pause });
+        let got = Expected::of(&PlayedPeriod { gates }, half, longest);
+        for (gate, pause) in pauses.into_iter().enumerate() {
+            let is = |word: u16| word >> gate & 1 != 0;
+            let wanted = (pause < longest, pause < half, pause > 0);
+            assert_eq!((is(got.must_be_on), is(got.may_be_on), is(got.is_off)), wanted, "{pause}");
+        }
+    }
+
+    /// A gate that is not as it should be in either period, seen on or off, is told once.
+    #[test]
+    fn a_gate_that_shows_what_it_should_not_is_told() {
+        let on = Expected { must_be_on: 1, may_be_on: 1, is_off: 0 };
+        let off = Expected { must_be_on: 0, may_be_on: 0, is_off: 1 };
+        let both = Expected { must_be_on: 1, may_be_on: 1, is_off: 1 };
+        let settings = Settings::new(Clock::new(25_000_000, 2_500), 2_500);
+        let mut task = PwmTask::new(&BUILT_IN, settings);
+        for (before, running, seen_on, seen_off, told) in [
+            (on, on, 1, 0, false),
+            (on, on, 0, 0, true),
+            (on, on, 1, 1, true),
+            (on, off, 1, 1, false),
+            (on, off, 0, 1, true),
+            (off, on, 0, 1, true),
+            (off, on, 1, 1, false),
+            // The pause before may be over.
+            (off, on, 1, 0, false),
+            (off, off, 0, 1, false),
+            (off, off, 1, 1, true),
+            (both, both, 1, 1, false),
+            (both, both, 1, 0, true),
+            (both, both, 0, 0, true),
+        ] {
+            task.expected = [before, running];
+            let wrong = task.stuck(&GateFeedback { on: seen_on, off: seen_off });
+            let wanted = told.then_some((Fault::LegStuck, 1.0, 0.0));
+            assert_eq!(wrong, wanted, "{before:?} {running:?} {seen_on} {seen_off}");
+        }
+    }
+}
