@@ -183,8 +183,10 @@ fn parameters_have_ranges_and_nothing_is_clamped() {
         }
     }
     for unknown in (0..=255).filter(|id| PARAMETERS.iter().all(|parameter| parameter.id != *id)) {
-        let answer = bench.parameter(unknown, Some(1.0)).unwrap();
-        assert_eq!((answer.outcome, answer.value), (Outcome::Unknown, None));
+        for write in [None, Some(1.0)] {
+            let answer = bench.parameter(unknown, write).unwrap();
+            assert_eq!((answer.outcome, answer.value), (Outcome::Unknown, None));
+        }
     }
     let over_rating = bench.parameter(3, Some(BUILT_IN.ratings.max_torque_nm + 1.0)).unwrap();
     assert_eq!(over_rating.outcome, Outcome::OutOfRange);

@@ -7,8 +7,9 @@ use tractive::nine_switch::Scheme;
 use tractive::operator::{DualRequest, DualStatus, Levels, State, Switches, Wanted};
 use tractive::ports::DualReport;
 use tractive::protocol::{
-    FROM_ZS9, Frame, MessageSet, Payload, Scales, StatusFrame, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LIMITS,
-    ZS9_LINK, Zs9, Zs9CanEndpoint, Zs9Command, Zs9Demands, Zs9Link, Zs9Measured, Zs9Session,
+    FROM_ZS9, Frame, MessageSet, ParameterRequest, Payload, Scales, StatusFrame, TO_ZS9, TorqueLimits,
+    ZS9_COMMAND, ZS9_LIMITS, ZS9_LINK, ZS9_PARAMETER_REQUEST, Zs9, Zs9CanEndpoint, Zs9Command, Zs9Demands,
+    Zs9Link, Zs9Measured, Zs9Session,
 };
 use tractive::time::Clock;
 
@@ -106,6 +107,33 @@ fn hostile_frames_are_rejected_and_counted() {
     let counts = session.counts();
     let rejected = [counts.repeated, counts.corrupted, counts.out_of_range, counts.truncated, counts.unknown];
     assert_eq!(rejected, [1, 2, 2, 1, 1]);
+}
+
+/// Every other slot is free for an answer: it has one message fewer than the other drive, and that slot is free too.
+#[test]
+fn an_answer_comes_within_two_slots() {
+    let status = DualStatus {
+        state: State::Ready,
+        trip: None,
+        refusal: None,
+        refusals: 0,
+        torque_nm: tractive::ports::DualDriveCommand::NONE.demands,
+        switches: Switches::default(),
+        temperatures: None,
+    };
+    for before in 0..20_u8 {
+        let (mut station, mut stream) = (Zs9CanEndpoint::new(ratings()), Stream::of(&ZS9_PARAMETER_REQUEST));
+        let mut request = || stream.frame(ParameterRequest { parameter: 1, write: None }.encode().unwrap());
+        // The first frame only sets the counter.
+        station.listen(1, Some(request()));
+        for _ in 0..before {
+            station.tell(&status, None);
+        }
+        station.listen(1, Some(request()));
+        let answer = FROM_ZS9[7].id;
+        let mut told = (0..2).filter_map(|_| station.tell(&status, None));
+        assert!(told.any(|frame| frame.id == answer), "after {before} slots");
+    }
 }
 
 #[test]

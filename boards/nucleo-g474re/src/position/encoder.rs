@@ -193,5 +193,7 @@ mod tests {
         let units = units_per_count(10_000, 3);
         let error = (u64::from(units) * 10_000).abs_diff(3 << 32);
         assert!(error <= 5_000, "{error}");
+        // 429,496.7296: to the nearest.
+        assert_eq!(units_per_count(10_000, 1), 429_497);
     }
 }
