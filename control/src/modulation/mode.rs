@@ -340,3 +340,19 @@ impl Mode {
         matches!(self.row().kind, Kind::Carrier)
     }
 }
+
+#[cfg(all(test, feature = "optimal"))]
+mod tests {
+    use super::*;
+
+    /// At the index at which a branch gives way on the way up the next one is played.
+    #[test]
+    fn at_its_border_a_branch_has_given_way() {
+        let family = || Mode::ALL.into_iter().filter(|mode| mode.family() == "opp7");
+        for (below, above) in family().zip(family().skip(1)) {
+            let border = below.row().until.highest_index();
+            assert_eq!(Mode::named_at("opp7", border), Some(above));
+            assert_eq!(Mode::named_at("opp7", border * 0.999_999), Some(below));
+        }
+    }
+}

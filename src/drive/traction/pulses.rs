@@ -376,4 +376,12 @@ mod tests {
         let boundaries = drive(pulses, half_ticks, rate);
         assert!(boundaries > 4 * 300, "{boundaries}");
     }
+
+    /// A quarter of a control period is not late yet.
+    #[test]
+    fn an_interrupt_is_overdue_after_a_quarter_of_a_period() {
+        let half = Half::off(Instant(0), Instant(1_000), 10_000);
+        let overdue = |late: u32| half.overdue(Instant(1_000 + late), &CLOCK);
+        assert_eq!([overdue(625).is_some(), overdue(626).is_some()], [false, true]);
+    }
 }
