@@ -258,6 +258,21 @@ fn what_is_sampled_wrong_trips_by_name() {
     }
 }
 
+/// Currents of either motor that stay the same while its rotor turns.
+#[test]
+fn currents_that_freeze_are_found() {
+    const STILL: Abc = Abc { a: 40.0, b: -25.0, c: -15.0 };
+    let cases: [Spoil; 2] =
+        [|sample, _| sample.currents_a[0] = STILL, |sample, _| sample.currents_a[1] = STILL];
+    for (motor, spoil) in cases.into_iter().enumerate() {
+        let mut drive = Drive::pulsing();
+        drive.fake.spoil = spoil;
+        drive.run(100);
+        let trip = drive.fake.report.trip.map(|trip| trip.fault);
+        assert_eq!((trip, drive.is_off()), (Some(Fault::Frozen), true), "motor {motor}");
+    }
+}
+
 #[test]
 fn the_pwm_interrupt_finds_what_is_quick() {
     let cases: [Case<fn(&mut PowerSample)>; 7] = [

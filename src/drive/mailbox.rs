@@ -351,4 +351,12 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_period_has_told_of_itself_and_no_other() {
+        let mailboxes = DualOperatorMailboxes::new();
+        assert!(!mailboxes.has_told(INSTANT), "nobody has");
+        mailboxes.tell(INSTANT, &DualReport::default());
+        assert!(mailboxes.has_told(INSTANT) && !mailboxes.has_told(INSTANT.after(1)));
+    }
 }

@@ -327,7 +327,8 @@ mod tests {
         let off = Expected { must_be_on: 0, may_be_on: 0, is_off: 1 };
         let both = Expected { must_be_on: 1, may_be_on: 1, is_off: 1 };
         let settings = Settings::new(Clock::new(25_000_000, 2_500), 2_500);
-        let mut task = PwmTask::new(&BUILT_IN, settings);
+        let mut task = PwmTask::new(&BUILT_IN, settings).beginning_at(Instant(70));
+        assert_eq!(task.next_call(), Instant(70 + 1_250), "a peak is half a carrier period on");
         for (before, running, seen_on, seen_off, told) in [
             (on, on, 1, 0, false),
             (on, on, 0, 0, true),
