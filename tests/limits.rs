@@ -3,7 +3,10 @@
 
 use tractive::built_in::traction::BUILT_IN;
 use tractive::cell::Words;
-use tractive::control::{Demand, Measurements};
+use tractive::control::{
+    AimInput, Committed, ControlLaw, Controller, Demand, Gains, Law, Measurements, ModeLimits, Regulated,
+    RotorSample, VoltageLimit, operating_point,
+};
 use tractive::frames::{Abc, AlphaBeta, Angle};
 use tractive::machine::Ratings;
 use tractive::protection::{
@@ -11,7 +14,7 @@ use tractive::protection::{
     Trip, check_angle, check_currents, check_demand, check_known, check_measurements, check_speed,
     check_undervoltage, safe_state, trip_from_words, trip_to_words,
 };
-use tractive::time::Instant;
+use tractive::time::{Clock, Instant};
 
 const RATINGS: &Ratings = &BUILT_IN.ratings;
 const PERIOD_S: f32 = 1e-4;
@@ -406,5 +409,54 @@ fn a_trip_comes_back_from_its_words() {
             SafeState::from_code(code),
             known.get(code as usize).copied().unwrap_or(SafeState::GatesOff)
         );
+    }
+}
+
+/// A demand that is this share of the most torque at 4,000 r/min and 1,000 V, before a machine that gives a tenth more than the map: the
+/// torque that is aimed at after a second, over the most.
+fn aimed_share(share: f32) -> f32 {
+    let (tables, clock) = (&BUILT_IN, Clock::new(25_000_000, 2_500));
+    let law = Law { gains: &Gains::DEFAULT, clock: &clock, tables };
+    let limits = ModeLimits {
+        follows: Regulated::Mean,
+        index_limit: 1.0,
+        steady_share: 1.0,
+        filled: false,
+        ripple_share: 0.05,
+        settled: true,
+    };
+    let turns = 4_000.0 / 60.0 * tables.ratings.pole_pairs * 1e-4;
+    let limit = VoltageLimit { udc_v: 1_000.0, modulation_index: 1.0, filled: false };
+    let omega = turns * 1e4 * std::f32::consts::TAU;
+    let most_nm = operating_point(1e4, omega, &limit, tables).torque_nm;
+    let demand = Demand { torque_nm: share * most_nm, slew_limited: false };
+    let volt_seconds = Some(AlphaBeta::default());
+    let committed = Committed { horizon_s: 0.0, volt_seconds, ripple: None, interval_s: 0.5e-3 };
+    let mut controller = Controller::new();
+    for period in 0..10_000_u16 {
+        let angle = Angle::from_turns(turns * f32::from(period));
+        controller.track(angle, &clock);
+        let current = controller.target().current * 1.1;
+        let sample = RotorSample::new(current.unpark(angle.sin_cos()).abc(), angle, tables);
+        controller.observe(&sample, tables);
+        if period % 5 == 0 && period > 1_000 {
+            let (window, swing) = (None, None);
+            let (udc_v, change_v, link_scale) = (1_000.0, 0.0, 1.0);
+            let demand = &demand;
+            let aim = AimInput { demand, window, udc_v, change_v, link_scale, swing, limits: &limits };
+            controller.aim(&aim, &law);
+            controller.regulate(&sample, &committed, &limits, &law);
+        }
+    }
+    controller.target().torque_nm / most_nm
+}
+
+/// A machine that gives more torque than its map is not asked for less where the demand is beyond what there is: there the crests of the ripple
+/// alone would take the torque down until the limit seemed kept.
+#[test]
+fn a_demand_beyond_the_limit_is_not_trimmed_down() {
+    for share in [1.01, 1.5] {
+        let aimed = aimed_share(share);
+        assert!((aimed - 1.0).abs() < 1e-3, "{share}: {aimed}");
     }
 }

@@ -147,4 +147,23 @@ mod tests {
         }
         assert!(pairs > 20, "{pairs}");
     }
+
+    /// Where branches meet, the one has an edge at the end of its last half where the other has.
+    #[test]
+    fn edges_at_the_end_are_those_of_both() {
+        let branches = || Mode::ALL.into_iter().filter_map(|mode| Some((mode, mode.branch()?)));
+        let mut met = 0;
+        for ((old, from), (new, to)) in branches().flat_map(|old| branches().map(move |new| (old, new))) {
+            let turn = 4 * from.quarter();
+            for half in
+                (0..turn).filter(|half| old != new && schedule::may_switch(old, new, (half + 1) % turn))
+            {
+                let ends = to.parts((half + 1) * to.halves / from.halves + 4 * to.quarter() - 1, 0.9);
+                let jump = |parts: [Part; 3]| parts.map(|part| part.jumps.1);
+                assert_eq!(jump(from.parts(half, 0.9)), jump(ends), "{old:?} {new:?} {half}");
+                met += 1;
+            }
+        }
+        assert!(met > 100, "{met}");
+    }
 }
