@@ -1,10 +1,10 @@
 //! Every fault, by name, with value and limit, and the gates in the safe state in the same interrupt.
 
 use tractive::built_in::traction::BUILT_IN;
-use tractive::control::{Demand, Measurements};
+use tractive::control::{ControlLaw, Controller, Demand, Measurements};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
-use tractive::modulation::{CarrierHalf, Mode, SwitchLimits};
+use tractive::modulation::{CarrierHalf, Mode, Schedule, SwitchLimits};
 use tractive::ports::Report;
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Sample};
 use tractive::protection::{DiodeWatch, Fault, FrozenWatch, LegFaults, OpenGates, SafeState, Trip};
@@ -171,9 +171,15 @@ impl PwmPort for Fake {
 fn drive(fake: &mut Fake, end: u32, control_until: u32) -> Option<Trip> {
     let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
     let settings = Settings::new(CLOCK, devices);
+    driven(fake, &mut ControlTask::new(&BUILT_IN, settings, Instant(2_500)), end, control_until)
+}
+
+/// The same with a control task of one's own.
+fn driven(fake: &mut Fake, control: &mut ControlTask, end: u32, control_until: u32) -> Option<Trip> {
+    let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
     let shared = Shared::new();
-    let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
-    let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(devices.shortest_half_ticks));
+    let mut pwm =
+        PwmTask::new(&BUILT_IN, Settings::new(CLOCK, devices), Instant(devices.shortest_half_ticks));
     loop {
         let (control_at, pwm_at) = (control.next_call(), pwm.next_call());
         let control_lives = control_at.0 < control_until;
@@ -631,4 +637,22 @@ fn an_angle_that_is_not_known_yet_is_no_fault_until_pulses_are_wanted() {
         assert_eq!(trip.map(|trip| trip.fault), Some(Fault::PositionSensor));
         assert!(fake.pulsed < from + 20_000, "and no pulse");
     }
+}
+
+/// Before its first call a task takes another schedule, other settings and another law.
+#[test]
+fn a_task_goes_by_what_it_was_set_up_with() {
+    let settings = Settings::new(CLOCK, SwitchLimits::new(250, 0, 900.0, &CLOCK));
+    for mode in [Mode::Async, Mode::Sync15] {
+        let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
+        control.set_schedule(Schedule::fixed(mode, &CLOCK));
+        let mut fake = Fake::turning(200.0);
+        assert_eq!(driven(&mut fake, &mut control, SETTLED, u32::MAX), None);
+        assert_eq!(fake.played.mode, mode);
+    }
+    let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
+    control.set_up(settings, Instant(5_000));
+    assert_eq!(control.next_call(), Instant(5_000));
+    control.set_law(Controller::with_tracking(123.0));
+    assert_eq!(control.law_mut().tracker().natural_rad_s(), 123.0);
 }
