@@ -266,7 +266,9 @@ pub fn check(measured: &Measurements, omega: f32, tables: &Tables) -> Option<Fai
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::built_in::zs9::BUILT_IN;
     use crate::control::Controller;
+    use crate::frames::Abc;
     use crate::time::Clock;
     use core::f64::consts::TAU;
 
@@ -317,6 +319,34 @@ mod tests {
             assert!(axis.speed_is_known());
             axis.recover_angle();
             assert_eq!(axis.speed_is_known(), !told, "{jump_rad} {trusted}");
+        }
+    }
+
+    /// The operating point may use 0.98 of the largest voltage: with an EMF above that the field is weakened.
+    #[test]
+    fn the_field_is_weakened_above_the_steady_share() {
+        for (share, weakens) in [(0.9, false), (1.05, true)] {
+            let mut axis = Axis::new(Controller::with_tracking(TRACKING_RAD_S));
+            let mut angle = Angle::ZERO;
+            for _ in 0..300 {
+                angle = angle + Angle::within_half_turn(0.02);
+                axis.track(angle, false, &SETTINGS);
+            }
+            let emf_v = axis.omega() * BUILT_IN.ratings.magnet_flux_wb;
+            let udc_v = emf_v / share * core::f32::consts::FRAC_PI_2;
+            let measured = Measurements { currents_a: Abc::default(), udc_v, angle };
+            let demand = MotorDemand::Torque(Demand { torque_nm: 0.0, slew_limited: false });
+            let mut output = AxisOutput::NOTHING;
+            let input = AxisInput {
+                measured: &measured,
+                demand: &demand,
+                speed_torque_nm: 0.0,
+                applied: None,
+                link_v: udc_v,
+                aims: true,
+            };
+            axis.step(&input, &SETTINGS, &BUILT_IN, &mut output);
+            assert_eq!(output.weakening, weakens, "{share}");
         }
     }
 }
