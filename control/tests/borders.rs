@@ -1,4 +1,4 @@
-//! Where one law ends and another begins: at the border itself, by value.
+//! Laws of control by value, at their borders: the tracker of the PI drive, the end of a half, names of modes.
 
 use tractive_control::control::{ControlLaw, MtpaStart, PiLaw};
 use tractive_control::frames::Angle;

@@ -172,7 +172,7 @@ mod tests {
         }
     }
 
-    /// What rounding makes of a rating is that rating, up to its border and no further.
+    /// A rating that was rounded is that rating, up to the border and no further.
     #[test]
     fn rounding_is_forgiven_up_to_its_border() {
         let border = 1_000.0 * (1.0 + STEP_SHARE);

@@ -130,7 +130,7 @@ mod tests {
         assert!((shares.a - 1.0).abs() < 1e-3 && shares.c.abs() < 1e-3, "{shares:?}");
     }
 
-    /// What is as near to one as to the other is a pulse, and what is as long as the shortest one may be is too, if the pause is.
+    /// A pulse as near to none as to the shortest one is made, and so is one of just the shortest length, if its pause is as long.
     #[test]
     fn a_pulse_of_just_half_the_shortest_is_made() {
         for (on, period, min_pulse, got) in [

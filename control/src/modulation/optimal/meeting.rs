@@ -148,7 +148,7 @@ mod tests {
         assert!(pairs > 20, "{pairs}");
     }
 
-    /// Where branches meet, the one has an edge at the end of its last half where the other has.
+    /// Both branches have an edge at the end of the last half, or neither, where they meet.
     #[test]
     fn edges_at_the_end_are_those_of_both() {
         let branches = || Mode::ALL.into_iter().filter_map(|mode| Some((mode, mode.branch()?)));
