@@ -21,13 +21,15 @@ pub struct Basis {
     terms: Vec<(usize, usize)>,
 }
 
-/// Chebyshev polynomials up to an order with their first three derivatives.
-fn chebyshev(x: f64, most: usize) -> Vec<[f64; 4]> {
-    let mut all = vec![[1.0, 0.0, 0.0, 0.0], [x, 1.0, 0.0, 0.0]];
+/// Chebyshev polynomials up to an order with their first four derivatives.
+fn chebyshev(x: f64, most: usize) -> Vec<[f64; 5]> {
+    let mut all = vec![[1.0, 0.0, 0.0, 0.0, 0.0], [x, 1.0, 0.0, 0.0, 0.0]];
     for n in 1..most {
-        let ([t, a, b, c], [t0, a0, b0, c0]) = (all[n], all[n - 1]);
-        let x2 = 2.0 * x;
-        all.push([x2 * t - t0, 2.0 * t + x2 * a - a0, 4.0 * a + x2 * b - b0, 6.0 * b + x2 * c - c0]);
+        let (last, before) = (all[n], all[n - 1]);
+        // The k-th derivative of 2 x T less the polynomial before.
+        let of =
+            |k: usize| 2.0 * x * last[k] - before[k] + if k > 0 { 2.0 * k as f64 * last[k - 1] } else { 0.0 };
+        all.push(core::array::from_fn(of));
     }
     all
 }
@@ -82,8 +84,8 @@ mod tests {
     fn the_derivatives_are_those_of_the_polynomial() {
         let basis = Basis::new(100.0);
         let (at, step) = ((-30.0, 20.0), 1e-3);
-        let orders =
-            [((0, 0), (1, 0)), ((1, 0), (2, 0)), ((2, 0), (3, 0)), ((0, 1), (0, 2)), ((0, 2), (0, 3))];
+        let along_d = (0..4).map(|order| ((order, 0), (order + 1, 0)));
+        let orders = along_d.chain((0..4).map(|order| ((0, order), (0, order + 1))));
         for (low, high) in orders {
             let along_d = high.0 > low.0;
             let moved = |by: f64| if along_d { (at.0 + by, at.1) } else { (at.0, at.1 + by) };

@@ -119,15 +119,30 @@ impl Equations {
         self.rows.resize(self.right.len() * self.unknowns, 0.0);
     }
 
-    /// The wish that flux linkages bend little, all over the rectangle: what no sample shows goes on straight.
-    pub fn smooth(&mut self, basis: &Basis, weight: f64) {
+    /// The same with the unknowns beside the co-energy's terms known.
+    pub fn given(mut self, beside: &[f64]) -> Self {
+        let terms = self.unknowns - beside.len();
+        let rows = core::mem::take(&mut self.rows);
+        for (row, right) in rows.chunks_exact(self.unknowns).zip(&mut self.right) {
+            let (own, known) = row.split_at(terms);
+            self.rows.extend(own);
+            *right -= known.iter().zip(beside).map(|(a, b)| a * b).sum::<f64>();
+        }
+        Self { unknowns: terms, ..self }
+    }
+
+    /// The wish that the co-energy's derivatives of an order are small, all over the rectangle, with a weight beside a sample's residual.
+    pub fn smooth(&mut self, basis: &Basis, order: usize, weight: f64) {
         let weight = weight * (self.samples as f64 / 2.0 / f64::from(GRID.0 * GRID.1)).sqrt();
         for current in basis.grid(GRID.0, GRID.1) {
-            for (orders, share) in
-                [((3, 0), 1.0), ((2, 1), 3.0_f64.sqrt()), ((1, 2), 3.0_f64.sqrt()), ((0, 3), 1.0)]
-            {
-                let bends = basis.derivative(current, orders);
-                self.add(bends.into_iter().map(|value| weight * share * value), 0.0);
+            // As much in every direction.
+            let mut binomial = 1.0_f64;
+            for along_q in 0..=order {
+                let along_d = order - along_q;
+                let share = weight * binomial.sqrt();
+                let bends = basis.derivative(current, (along_d, along_q));
+                self.add(bends.into_iter().map(|value| share * value), 0.0);
+                binomial *= along_d as f64 / (along_q + 1) as f64;
             }
         }
     }

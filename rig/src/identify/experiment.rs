@@ -15,8 +15,12 @@ use super::spread::BESIDE;
 use anyhow::{Result, ensure};
 use tractive::identification::Observation;
 
-/// Weight of the flux linkage's curvature beside a sample's residual, in squares of the bound: how smooth a machine is.
-const SMOOTHNESS: f64 = 4e-4;
+/// Weight of the flux linkages' bends beside a sample's residual, in squares of the bound: how straight a machine is, as far as it is to tell resistance,
+/// inverter, zero and magnets apart. And weight of the change of the bends, in cubes of it, for the map itself: iron saturates further where no pulse has been.
+const STRAIGHT: f64 = 4e-4;
+const ONWARD: f64 = 1.5e-5;
+/// Weight of what is known for sure beside a sample's residual.
+const SURE: f64 = 1e3;
 /// Phase current, as a share of the bound, whose sign is not sure.
 const SMALL_SHARE: f64 = 0.006;
 /// Rounds in which ripple, inductances and the angle's zero find each other: at least, at most, and the change of the zero, in rad, below
@@ -104,6 +108,7 @@ impl Experiment<'_> {
         }
         let boundaries = self.boundaries(Some(&fit));
         fit.still = self.still(&boundaries, &fit)?;
+        fit.terms = self.onward(&boundaries, &fit)?;
         fit.turning = turning(&boundaries, &fit);
         Ok(fit)
     }
@@ -116,7 +121,7 @@ impl Experiment<'_> {
         scope: Scope,
     ) -> Equations {
         let mut equations = Equations::of(boundaries, basis, known, scope);
-        equations.smooth(basis, SMOOTHNESS * self.bound_a * self.bound_a);
+        equations.smooth(basis, 3, STRAIGHT * self.bound_a * self.bound_a);
         equations
     }
 
@@ -144,6 +149,18 @@ impl Experiment<'_> {
             turning: Vec::new(),
             spread: solution.spread,
         })
+    }
+
+    /// The terms of a map whose bends change little: what is no part of the map, and the magnets' flux linkage, stay what they are in the fit of all,
+    /// whose straighter map tells them apart.
+    fn onward(&self, boundaries: &[Boundary], fit: &Fit) -> Result<Vec<f64>> {
+        let beside = [fit.resistance_ohm, fit.dead_time_s, fit.threshold_v];
+        let mut equations = Equations::of(boundaries, &fit.basis, None, Scope::All).given(&beside);
+        equations.smooth(&fit.basis, 4, ONWARD * self.bound_a.powi(3));
+        let [along_d, _] = fit.basis.flux((0.0, 0.0));
+        let magnet_wb = fit.flux(0.0, 0.0).0;
+        equations.add(along_d.into_iter().map(|share| SURE * share), SURE * magnet_wb);
+        Ok(equations.solve()?.unknowns)
     }
 
     /// The terms that the pulses at standstill show: the magnets' flux linkage is no part of it, and stays what it is in the fit of all.

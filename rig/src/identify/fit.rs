@@ -7,6 +7,9 @@ use super::spread::{BESIDE, Spread};
 use tractive::identification::Stage;
 use tractive_tablegen::FluxMap;
 
+/// Current over the bound up to which the polynomial is the map: what has no sample near it, and where no ripple goes, goes on straight.
+const KNOWN_SHARE: f64 = 1.1;
+
 /// A flux linkage at a current, as the turning rotor shows it, and as the pulses do.
 #[derive(Clone, Copy, Debug)]
 pub struct Turning {
@@ -116,15 +119,67 @@ impl Fit {
         (per_s * self.dead_time_s + self.threshold_v, self.spread.error(&shares))
     }
 
+    /// Flux linkages at a current in A, which beyond a circle go on straight outward from it: with the incremental inductances that the circle has. As
+    /// these are not the same all around it, a part along the circle keeps both the derivatives of one co-energy, `W + W_r h + W_rr h²/2`.
+    fn flux_further(&self, current: (f64, f64), from_a: f64) -> (f64, f64) {
+        let r = current.0.hypot(current.1);
+        if r <= from_a {
+            return self.flux(current.0, current.1);
+        }
+        let (h, c, s) = (r - from_a, current.0 / r, current.1 / r);
+        let at = (from_a * c, from_a * s);
+        let of = |orders| self.basis.derivative(at, orders).iter().zip(&self.terms).map(|(a, b)| a * b).sum();
+        let (psi, [dd, dq, qq]) = (self.flux(at.0, at.1), self.inductances(at));
+        let [ddd, ddq, dqq, qqq]: [f64; 4] = [(3, 0), (2, 1), (1, 2), (0, 3)].map(of);
+        let around =
+            c * s * (qqq * s - ddd * c) + ddq * c * (c * c - 2.0 * s * s) + dqq * s * (2.0 * c * c - s * s);
+        let bent = 0.5 * h * h * from_a / r * around;
+        (psi.0 + h * (dd * c + dq * s) - bent * s, psi.1 + h * (dq * c + qq * s) + bent * c)
+    }
+
     /// The map on a grid that the table generator takes: up to the bound and a little more, along +d a fifth of it.
     pub fn map(&self, bound_a: f64) -> FluxMap {
         const STEPS: i32 = 25;
         let current_a = |step: i32| crate::folder::digits(bound_a * f64::from(step) / f64::from(STEPS));
         let id_a: Vec<f64> = (-STEPS - 2..=5).map(current_a).collect();
         let iq_a: Vec<f64> = (-STEPS - 2..=STEPS + 2).map(current_a).collect();
-        let nodes = id_a.iter().flat_map(|id| iq_a.iter().map(|iq| self.flux(*id, *iq)));
+        let from_a = KNOWN_SHARE * bound_a;
+        let nodes = id_a.iter().flat_map(|id| iq_a.iter().map(|iq| self.flux_further((*id, *iq), from_a)));
         let short = crate::folder::digits;
         let (psi_d_wb, psi_q_wb) = nodes.map(|(d, q)| (short(d), short(q))).unzip();
         FluxMap { psi_d_wb, psi_q_wb, id_a, iq_a }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DMatrix;
+
+    #[test]
+    fn the_map_beyond_the_circle_is_still_one_co_energys_gradient() {
+        let basis = Basis::new(100.0);
+        let terms: Vec<f64> = (0..basis.len()).map(|k| (1.0 + k as f64).sin() / (1.0 + k as f64)).collect();
+        let spread = Spread { factor: DMatrix::zeros(0, 0), lengths: Vec::new(), sigma: 0.0 };
+        let fit = Fit {
+            basis,
+            terms,
+            resistance_ohm: 0.0,
+            dead_time_s: 0.0,
+            threshold_v: 0.0,
+            zero_rad: 0.0,
+            residuals: Vec::new(),
+            still: Vec::new(),
+            turning: Vec::new(),
+            spread,
+        };
+        let (flux, step_a) = (|d: f64, q: f64| fit.flux_further((d, q), 90.0), 1e-4);
+        for (d, q) in [(-80.0, 60.0), (-100.0, 20.0), (-70.0, -95.0), (15.0, 100.0)] {
+            let by_q = (flux(d, q + step_a).0 - flux(d, q - step_a).0) / (2.0 * step_a);
+            let by_d = (flux(d + step_a, q).1 - flux(d - step_a, q).1) / (2.0 * step_a);
+            assert!((by_q - by_d).abs() < 1e-6 * (1.0 + by_q.abs()), "{d}, {q}: {by_q}, {by_d}");
+        }
+        let (within, beyond) = (flux(-53.999, 71.999), flux(-54.001, 72.001));
+        assert!((within.0 - beyond.0).hypot(within.1 - beyond.1) < 1e-3, "{within:?}, {beyond:?}");
     }
 }
