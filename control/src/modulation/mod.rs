@@ -116,5 +116,5 @@ pub use modulator::Modulator;
 pub use optimal::ripple as optimal_ripple;
 pub use reference::Reference;
 pub use ripple::{RippleFlux, ripple_share};
-pub use schedule::{Ladder, Schedule, first_half, index_limit};
+pub use schedule::{Ladder, Schedule, first_half, index_floor, index_limit};
 pub use switch_limits::{FREE_CARRIER_SHARE, SwitchLimits};

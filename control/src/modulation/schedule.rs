@@ -125,6 +125,9 @@ impl Schedule {
         const CARRIER_CATCHES_SHARE: f32 = 0.2;
         /// By how much the modulation index may stay below the operating point's by the map.
         const MAP_ROOM: f32 = 0.02;
+        let floor = index_floor(seen.rate, devices);
+        let index = if floor > seen.modulation_index { floor } else { seen.modulation_index };
+        let seen = &Reference { modulation_index: index, ..*seen };
         // No branch has less than its smallest index: where the machine has less flux linkage than its map, or the link jumps up, what is
         // made counts, at once.
         let seen = &match mode.branch() {
@@ -265,6 +268,17 @@ fn largest(row: &Row, notch: f32) -> f32 {
 /// the carriers, what the shortest notch leaves for middle 60°, 1 for the square wave.
 pub fn index_limit(mode: Mode, rate: f32, devices: &SwitchLimits) -> f32 {
     largest(mode.row(), shortest_notch(rate, devices))
+}
+
+/// The fundamental that a pattern should have at least, as a share of six-step, with `rate` in angle units per tick: it rises to the whole where
+/// the devices allow three pulses a turn no longer, so that square wave finds the flux linkage that it forces. Negative, so no bound at all,
+/// below the frequency at which it begins.
+#[inline(always)]
+pub fn index_floor(rate: f32, devices: &SwitchLimits) -> f32 {
+    /// Share of the highest switching frequency where it is nothing, and the one over which it rises to the whole.
+    const FROM_SHARE: f32 = 0.21;
+    const OVER_SHARE: f32 = 0.12;
+    (rate.abs() * (2.0 / 4_294_967_296.0) * devices.shortest_half_ticks as f32 - FROM_SHARE) * (1.0 / OVER_SHARE)
 }
 
 /// `true` if the carrier that ends where half number `next_half` begins may give way to `to`: a locked carrier must have

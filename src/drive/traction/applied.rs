@@ -8,7 +8,7 @@ use crate::control::{Boundary, Committed, ModeLimits, Regulated, Ripple};
 use crate::frames::{AlphaBeta, Angle};
 #[cfg(feature = "optimal")]
 use crate::modulation::optimal_ripple;
-use crate::modulation::{Mode, Reference, Regulation, RippleFlux, first_half, index_limit, ripple_share};
+use crate::modulation::{Mode, Reference, Regulation, RippleFlux, first_half, index_floor, index_limit, ripple_share};
 use crate::time::{Clock, Instant};
 
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
@@ -81,13 +81,14 @@ pub(super) fn limits(
 ) -> ModeLimits {
     let Settings { clock, devices, .. } = settings;
     let mode = decision.mode;
-    let largest = index_limit(mode, clock.angle_rate(steady.omega), devices);
+    let rate = clock.angle_rate(steady.omega);
+    let largest = index_limit(mode, rate, devices);
     // Edges can move at an optimised pattern's largest index, too.
     let is_all = mode.is_whole() || mode.is_optimal();
     let largest = if is_all { largest } else { REGULATION_ROOM * largest };
     // The last half before another pattern leads to the point that the torque's trim asks for there.
     let trimmed = if mode.is_pattern() && decision.after.is_pattern() { decision.after } else { mode };
-    let (index_limit, filled) = exit.fill(mode, largest, steady.modulation_index, passed_s);
+    let (index_limit, filled) = exit.fill(mode, [index_floor(rate, devices), largest], steady.modulation_index, passed_s);
     ModeLimits {
         follows: follows(mode),
         index_limit,

@@ -59,18 +59,31 @@ impl SixStepExit {
         self.side_nm = if torque_nm == 0.0 { f32::MIN_POSITIVE } else { torque_nm };
     }
 
-    /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave, and
-    /// after it for as long as the voltage falls from there to what the torque `needed` in the last period: once the load
-    /// angle has followed.
-    pub(super) fn fill(&mut self, decided: Mode, largest: f32, needed: f32, period_s: f32) -> (f32, bool) {
+    /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave,
+    /// after it for as long as the voltage falls from there to what the torque `needed` in the last period, once the load
+    /// angle has followed, and while that is less than the `least` near the frequency at which only square wave is left.
+    pub(super) fn fill(
+        &mut self,
+        decided: Mode,
+        [least, largest]: [f32; 2],
+        needed: f32,
+        period_s: f32,
+    ) -> (f32, bool) {
         if decided.is_whole() {
             self.filled_to = 1.0;
             return (largest, true);
         }
+        let step = EXIT_PER_S * period_s;
+        let before = self.filled_to;
         if self.unsettled.1 == 0 {
-            self.filled_to -= EXIT_PER_S * period_s;
+            self.filled_to -= step;
         }
-        if !decided.is_pattern() || self.filled_to < needed {
+        // Not before the first operating point, of which nothing is known.
+        if self.filled_to < least && needed > 0.0 {
+            let more = step + if before > needed { before } else { needed };
+            self.filled_to = if more < least { more } else { least };
+        }
+        if !(decided.is_pattern() || decided.is_optimal()) || self.filled_to < needed {
             self.filled_to = 0.0;
             return (largest, false);
         }
@@ -124,7 +137,7 @@ mod tests {
     /// Out of square wave.
     fn exit(side_nm: Option<f32>) -> SixStepExit {
         let mut exit = SixStepExit::new();
-        assert_eq!(exit.fill(Mode::Square, 0.97, 0.4, 1.0), (0.97, true));
+        assert_eq!(exit.fill(Mode::Square, [-1.0, 0.97], 0.4, 1.0), (0.97, true));
         side_nm.into_iter().for_each(|side_nm| exit.drove(side_nm));
         exit
     }
@@ -135,15 +148,15 @@ mod tests {
         // 12 a second: a quarter in each of these periods.
         let period_s = 1.0 / 48.0;
         assert_eq!(
-            exit.fill(Mode::Mid3, 0.97, 0.75, period_s),
+            exit.fill(Mode::Mid3, [-1.0, 0.97], 0.75, period_s),
             (0.75, true),
             "what is needed is still there"
         );
-        assert_eq!(exit.fill(Mode::Mid3, 0.45, 0.4, period_s), (0.45, true), "no more than the largest");
-        assert_eq!(exit.fill(Mode::Mid3, 0.97, 0.4, period_s), (0.97, false));
-        assert_eq!(exit.fill(Mode::Mid3, 0.97, 0.0, 0.0), (0.0, true), "and nothing is left of it");
+        assert_eq!(exit.fill(Mode::Mid3, [-1.0, 0.45], 0.4, period_s), (0.45, true), "no more than the largest");
+        assert_eq!(exit.fill(Mode::Mid3, [-1.0, 0.97], 0.4, period_s), (0.97, false));
+        assert_eq!(exit.fill(Mode::Mid3, [-1.0, 0.97], 0.0, 0.0), (0.0, true), "and nothing is left of it");
         let mut exit = self::exit(None);
-        assert_eq!(exit.fill(Mode::Sync12, 0.9, 0.1, period_s), (0.9, false), "a carrier needs no ramp");
+        assert_eq!(exit.fill(Mode::Sync12, [-1.0, 0.9], 0.1, period_s), (0.9, false), "a carrier needs no ramp");
     }
 
     #[test]
@@ -156,10 +169,10 @@ mod tests {
         for boundary in 0..halves {
             assert!(!exit.is_settled(&at(boundary, Mode::Mid3)), "{boundary}");
             assert!(!exit.is_settled(&at(boundary, Mode::Mid3)), "{boundary}, once more");
-            assert_eq!(exit.fill(Mode::Mid3, 0.97, 0.1, 1.0 / 48.0), (0.97, true));
+            assert_eq!(exit.fill(Mode::Mid3, [-1.0, 0.97], 0.1, 1.0 / 48.0), (0.97, true));
         }
         assert!(exit.is_settled(&at(halves, Mode::Mid3)));
-        assert_eq!(exit.fill(Mode::Mid3, 0.97, 0.1, 1.0 / 48.0), (0.75, true));
+        assert_eq!(exit.fill(Mode::Mid3, [-1.0, 0.97], 0.1, 1.0 / 48.0), (0.75, true));
         assert!(exit.is_settled(&at(halves + 1, Mode::Sync12)), "a carrier needs no growth");
         assert!(exit.is_settled(&at(halves + 2, Mode::Mid7)), "nor does a pattern out of one");
     }
