@@ -195,6 +195,11 @@ impl Sensors {
         Self { udc_v, link_steps, converter: Converter::new(flaws), encoder: None, told_a: Abc::default() }
     }
 
+    /// Noise of the sum of three phase currents as they are read, rms, in A.
+    pub fn sum_noise_a(&self) -> f32 {
+        (3.0_f64.sqrt() * self.converter.flaws.noise_a) as f32
+    }
+
     /// The same with an incremental encoder, if there is one.
     pub fn with_encoder(mut self, encoder: Option<Encoder>) -> Self {
         self.encoder = encoder;

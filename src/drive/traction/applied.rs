@@ -8,7 +8,9 @@ use crate::control::{Boundary, Committed, ModeLimits, Regulated, Ripple};
 use crate::frames::{AlphaBeta, Angle};
 #[cfg(feature = "optimal")]
 use crate::modulation::optimal_ripple;
-use crate::modulation::{Mode, Reference, Regulation, RippleFlux, first_half, index_floor, index_limit, ripple_share};
+use crate::modulation::{
+    Mode, Reference, Regulation, RippleFlux, first_half, index_floor, index_limit, ripple_share,
+};
 use crate::time::{Clock, Instant};
 
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
@@ -88,7 +90,8 @@ pub(super) fn limits(
     let largest = if is_all { largest } else { REGULATION_ROOM * largest };
     // The last half before another pattern leads to the point that the torque's trim asks for there.
     let trimmed = if mode.is_pattern() && decision.after.is_pattern() { decision.after } else { mode };
-    let (index_limit, filled) = exit.fill(mode, [index_floor(rate, devices), largest], steady.modulation_index, passed_s);
+    let (index_limit, filled) =
+        exit.fill(mode, [index_floor(rate, devices), largest], steady.modulation_index, passed_s);
     ModeLimits {
         follows: follows(mode),
         index_limit,

@@ -152,11 +152,37 @@ mod tests {
             (0.75, true),
             "what is needed is still there"
         );
-        assert_eq!(exit.fill(Mode::Mid3, [-1.0, 0.45], 0.4, period_s), (0.45, true), "no more than the largest");
+        assert_eq!(
+            exit.fill(Mode::Mid3, [-1.0, 0.45], 0.4, period_s),
+            (0.45, true),
+            "no more than the largest"
+        );
         assert_eq!(exit.fill(Mode::Mid3, [-1.0, 0.97], 0.4, period_s), (0.97, false));
         assert_eq!(exit.fill(Mode::Mid3, [-1.0, 0.97], 0.0, 0.0), (0.0, true), "and nothing is left of it");
         let mut exit = self::exit(None);
-        assert_eq!(exit.fill(Mode::Sync12, [-1.0, 0.9], 0.1, period_s), (0.9, false), "a carrier needs no ramp");
+        assert_eq!(
+            exit.fill(Mode::Sync12, [-1.0, 0.9], 0.1, period_s),
+            (0.9, false),
+            "a carrier needs no ramp"
+        );
+    }
+
+    #[test]
+    fn the_voltage_rises_to_the_least_and_falls_with_it() {
+        let period_s = 1.0 / 96.0;
+        for mode in [Mode::Mid3, Mode::Mid7] {
+            let mut exit = SixStepExit::new();
+            let mut fill = |least, needed| exit.fill(mode, [least, 0.97], needed, period_s);
+            assert_eq!(fill(0.5, 0.0), (0.97, false), "no operating point yet");
+            assert_eq!(fill(0.5, 0.75), (0.97, false), "more is needed");
+            // 12 a second: an eighth in each of these periods, from what is needed on.
+            assert_eq!(fill(1.0, 0.25), (0.375, true));
+            assert_eq!(fill(1.0, 0.25), (0.5, true));
+            assert_eq!(fill(0.5, 0.25), (0.5, true));
+            assert_eq!(fill(0.4375, 0.25), (0.4375, true));
+            assert_eq!(fill(-1.0, 0.25), (0.3125, true), "and falls as after square wave");
+            assert_eq!(fill(-1.0, 0.25), (0.97, false));
+        }
     }
 
     #[test]
