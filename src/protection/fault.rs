@@ -52,7 +52,7 @@ pub enum Fault {
     PwmDeadline,
     /// The board did not leave the safe state when it was told to, or for so long after an acknowledge, in s.
     GatesHeld,
-    /// A current sensor shows a current where there is none, in A.
+    /// A current where there should be none, in A: a sensor shows it, or a machine with its gates off generates through the diodes.
     CurrentOffset,
     /// The link's voltage cannot be what it is measured as, in V.
     LinkImplausible,

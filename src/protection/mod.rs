@@ -23,5 +23,5 @@ pub use frozen::FrozenWatch;
 pub use legs::LegFaults;
 pub use link::LinkLimits;
 pub use masked_faults::MaskedFaults;
-pub use safe::{DiodeWatch, OpenGates, SafeState, safe_state};
+pub use safe::{DiodeWatch, OpenGates, SafeState, generating, safe_state};
 pub use words::{trip_from_words, trip_to_words};

@@ -1,6 +1,6 @@
 //! The safe states, and which of them the speed asks for.
 
-use super::LegFaults;
+use super::{FailedCheck, Fault, LegFaults};
 use crate::frames::{Abc, SQRT_3};
 use crate::machine::Ratings;
 
@@ -58,7 +58,7 @@ const FLOWING_SHARE: f32 = 0.05;
 /// IEEE Trans. Ind. Appl. 35(6), 1999. Up to `ξ` = 18 that is above half the link, with saturation and hot or cold magnets.
 ///
 /// Where nothing is held, the current is gone within an electrical turn. From half the link on a short circuit brakes little, and so a sensor that
-/// shows a current which is none does no harm.
+/// shows a current which is none does no harm: an empty link counts as one at the trip level of its voltage, or it would do so from standstill on.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DiodeWatch {
     /// By how much the rotor has turned while current flowed, in electrical rad.
@@ -83,7 +83,9 @@ impl DiodeWatch {
         let OpenGates { currents_a: Abc { a, b, c }, udc_v, omega, period_s } = *open;
         let least_a = FLOWING_SHARE * ratings.max_current_a;
         let flows = [a, b, c].iter().any(|current| current.abs() > least_a);
-        let held = emf_v(omega, ratings) > GENERATING_SHARE * standing_v(udc_v, ratings);
+        let (standing_v, least_v) = (standing_v(udc_v, ratings), ratings.trip_dc_under_v);
+        let charged_v = if standing_v > least_v { standing_v } else { least_v };
+        let held = emf_v(omega, ratings) > GENERATING_SHARE * charged_v;
         let generates = safe == SafeState::GatesOff && flows && held;
         self.turned_rad = if generates { self.turned_rad + omega.abs() * period_s } else { 0.0 };
         let shorted = legs.in_place_of(SafeState::ShortCircuit, omega, ratings);
@@ -102,6 +104,11 @@ pub struct OpenGates {
     pub omega: f32,
     /// Its length, in s.
     pub period_s: f32,
+}
+
+/// The fault of a machine that generates with its gates off although nothing has tripped: its largest phase current.
+pub fn generating(open: &OpenGates, ratings: &Ratings) -> FailedCheck {
+    (Fault::CurrentOffset, open.currents_a.peak(), FLOWING_SHARE * ratings.max_current_a)
 }
 
 /// The link's voltage, in V; above its nominal voltage that: it will not stay there.

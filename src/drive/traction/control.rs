@@ -273,7 +273,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             true
         } else {
             self.rest(now, omega, measured);
-            if self.trip.is_some() {
+            // Who blocks the gates without an operator has them back when he likes.
+            if self.operated || self.trip.is_some() {
                 self.stay_safe(sample, omega, port);
             }
             let commands = command.enable.then_some(slot.commands);

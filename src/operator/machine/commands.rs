@@ -65,7 +65,8 @@ impl<D: Demands> Operator<D> {
             let waiting = matches!(self.phase, Phase::Fault { .. });
             return self.refuse(if waiting { Refusal::FaultNotAcknowledged } else { Refusal::NoFault });
         };
-        let shorted = trip.safe != SafeState::GatesOff;
+        // Gates that were off may have become a short circuit since.
+        let shorted = input.observed.trip.unwrap_or(trip).safe != SafeState::GatesOff;
         let held = if shorted {
             health::shorted_current(input, settings).is_some()
                 || !input.observed.speed_known

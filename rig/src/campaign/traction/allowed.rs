@@ -29,7 +29,7 @@ impl Drive {
         let udc_v = self.forced_udc_v(case, observed);
         let capacitance_f = case.conditions.filter.capacitance_f;
         Allowed {
-            longest_s: self.longest_s(case, seen.carrier_s),
+            longest_s: self.longest_s(case, seen),
             current_a,
             udc_v,
             uc_v: None,
@@ -53,7 +53,8 @@ impl Drive {
 
     /// The longest time from a fault's first effect until the gates are safe, in s: three carriers, or, where a fault shows with the
     /// rotor's angle, half an electrical turn.
-    fn longest_s(&self, case: &Case, carrier_s: f64) -> f64 {
+    fn longest_s(&self, case: &Case, seen: &Seen) -> f64 {
+        let carrier_s = seen.carrier_s;
         let carriers_s = 3.0 * carrier_s;
         if case.fault.needs_rest() {
             return STAGES.end_s;
@@ -67,7 +68,11 @@ impl Drive {
                 carriers_s.max(half_turn_s(speed_rpm - lost_rpm, pole_pairs))
             }
             Cause::Runaway => carriers_s + TRACKING_S,
-            Cause::Sensor(..) => sensors::longest_s(carrier_s),
+            Cause::Sensor(..) => {
+                let turn_s =
+                    2.0 * half_turn_s(case.point.speed_rpm, self.machine.folder.parameters.pole_pairs);
+                sensors::longest_s(carrier_s, seen.trip.map(|trip| trip.safe), turn_s)
+            }
             _ => carriers_s,
         }
     }

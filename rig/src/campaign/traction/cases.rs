@@ -49,8 +49,8 @@ const POINTS: [Point; 18] = [
 /// From where a rotor runs away, in r/min: it must be above 6,600 in time.
 pub(super) const RUNAWAY_FROM_RPM: f64 = 5_000.0;
 
-/// The speed up to which the temperature sensors fail, in r/min: gates off stop the machine there, whatever it did.
-const OPERATED_TO_RPM: f64 = 3_000.0;
+/// The speed up to which the temperature sensors fail, in r/min: faster, the EMF is above the link, and the drive shorts the machine before anybody enables it.
+const OPERATED_TO_RPM: f64 = 4_500.0;
 
 impl Named<Cause> {
     /// `true` if it comes at rest, and the rotor is pushed off.
@@ -63,7 +63,6 @@ impl Named<Cause> {
         let speed_rpm = point.speed_rpm.abs();
         match self.cause {
             Cause::Runaway => speed_rpm >= RUNAWAY_FROM_RPM,
-            // Faster, gates that an operator has taken off may leave the machine generating, which the guide tells.
             Cause::Sensor(..) => speed_rpm <= OPERATED_TO_RPM,
             Cause::Bench(Kind::Angle(AngleFault::Frozen | AngleFault::Reversed)) => {
                 self.needs_rest() == (speed_rpm == 0.0)

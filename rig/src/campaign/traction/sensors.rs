@@ -30,9 +30,11 @@ const PERSISTENCE_S: f64 = 0.01;
 /// Slots of the operator from a reading to gates that are off, in s: one begun already, its own, and the one in which its word holds.
 const SLOTS_S: f64 = 3e-3;
 
-/// The longest time from a sensor's fault until the gates are off, in s; the pulses that are planned end first.
-pub(super) fn longest_s(carrier_s: f64) -> f64 {
-    PERSISTENCE_S + SLOTS_S + carrier_s
+/// The longest time from a sensor's fault until the gates are off, in s; the pulses that are planned end first. Where a machine goes on generating
+/// they are shorted an electrical turn later.
+pub(super) fn longest_s(carrier_s: f64, safe: Option<SafeState>, turn_s: f64) -> f64 {
+    let off_s = PERSISTENCE_S + SLOTS_S + carrier_s;
+    if safe == Some(SafeState::ShortCircuit) { off_s + turn_s } else { off_s }
 }
 
 impl Drive {
@@ -51,7 +53,8 @@ impl Drive {
         tasks.drive(&mut bench, |_| true)?;
         let before = bench.observed;
         let recording = bench.into_recording(Vec::new());
-        let (trip, observed) = told(&recording, before);
+        let safe = tasks.trip().map_or(SafeState::GatesOff, |trip| trip.safe);
+        let (trip, observed) = told(&recording, before, safe);
         let tick_s = recording.tick_s;
         let rows = &recording.rows;
         let mode = rows.iter().take_while(|row| row.t_s < case.at_s).last().map_or(Mode::Off, |row| row.mode);
@@ -119,14 +122,15 @@ fn link(voltage_v: f64) -> DcLinkSettings {
     }
 }
 
-/// The operator's fault, and what was observed with the gates off from their last edge on: nobody orders a safe state, the pulses end.
-fn told(recording: &Recording, before: Observed) -> (Option<Trip>, Observed) {
-    let trip = recording.slots.iter().find_map(|slot| slot.status.trip);
+/// The operator's fault with the safe state that the drive found itself, if any, and what was observed from the last edge on: where nobody orders a
+/// safe state, the pulses end.
+fn told(recording: &Recording, before: Observed, safe: SafeState) -> (Option<Trip>, Observed) {
+    let trip = recording.slots.iter().find_map(|slot| slot.status.trip).map(|trip| Trip { safe, ..trip });
     let last = recording.edges.iter().rfind(|edge| !edge.on).map(|edge| edge.tick);
     let still_on = recording.rows.last().is_none_or(|row| row.mode != Mode::Off);
     let mut observed = before;
     if let (Some(last), Some(_), false) = (last, trip, still_on) {
-        observed.enters(last, SafeState::GatesOff, observed.stored);
+        observed.enters(last, safe, observed.stored);
     }
     (trip, observed)
 }

@@ -5,7 +5,7 @@ use crate::control::{ControlLaw, Measurements};
 use crate::frames::Angle;
 use crate::machine::Machine;
 use crate::ports::{ControlPort, DriveCommand, Sample};
-use crate::protection::{self, FailedCheck, OpenGates, Trip};
+use crate::protection::{self, FailedCheck, OpenGates, SafeState, Trip};
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
@@ -106,17 +106,20 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.enter(Trip { fault, value, limit, at, safe }, port);
     }
 
-    /// A period after a trip: gates that are off become the short circuit where the machine goes on generating through the diodes.
+    /// A period without pulses of the control law: gates that are off become the short circuit where the machine goes on generating through the
+    /// diodes. Without a trip that is one: an operator takes the gates off at such a speed for a fault of his own or for `off`, else he waits.
     #[cold]
     #[inline(never)]
     pub(super) fn stay_safe(&mut self, sample: &Sample, omega: f32, port: &mut impl ControlPort) {
-        let Some(trip) = self.trip else { return };
         let Sample { currents_a, udc_v, .. } = *sample;
         let open = OpenGates { currents_a, udc_v, omega, period_s: self.settings.clock.control_s() };
         let ratings = &self.machine.tables().ratings;
-        if let Some(safe) = self.diodes.step(trip.safe, &open, &port.leg_faults(), ratings) {
-            self.enter(Trip { safe, ..trip }, port);
-        }
+        let safe = self.trip.map_or(SafeState::GatesOff, |trip| trip.safe);
+        let Some(safe) = self.diodes.step(safe, &open, &port.leg_faults(), ratings) else { return };
+        let (fault, value, limit) = protection::generating(&open, ratings);
+        let at = self.now.before(self.settings.clock.control_ticks);
+        let trip = self.trip.unwrap_or(Trip { fault, value, limit, at, safe });
+        self.enter(Trip { safe, ..trip }, port);
     }
 
     /// The safe state that a fault asks for.

@@ -13,7 +13,7 @@ use crate::frames::{Angle, SinCos, six_step_v};
 use crate::machine::Machine;
 use crate::modulation::{Mode, Reference};
 use crate::ports::Sample;
-use crate::protection::{FrozenWatch, SafeState, safe_state};
+use crate::protection::{DiodeWatch, FrozenWatch, SafeState, safe_state};
 use crate::time::Instant;
 
 /// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
@@ -39,6 +39,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
             self.delay = self.delayed();
+            self.diodes = DiodeWatch::new();
         }
         if slot.aims || (slot.commands && slices_fold) {
             self.look_ahead(input.sample.udc_v, slot);
