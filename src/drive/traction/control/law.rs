@@ -39,7 +39,6 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
             self.delay = self.delayed();
-            self.diodes = DiodeWatch::new();
         }
         if slot.aims || (slot.commands && slices_fold) {
             self.look_ahead(input.sample.udc_v, slot);
@@ -178,6 +177,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
         self.steady_v = voltage.steady_v;
         self.mode = mode;
+        self.diodes = DiodeWatch::new();
         self.watch.command(voltage.vector);
         self.reference = Reference {
             // An optimised pattern is that of the operating point; the vector moves its edges.
