@@ -33,23 +33,22 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.revises = self.is_to_revise(slot.now, &input.command.demand);
         let commands = slot.commands || self.revises;
         let aims = slot.aims || (commands && !self.aimed.is_some_and(|aimed| aimed.is_of(&slot.key)));
-        let slices_fold = slot.between > 0;
-        // Not in the longest periods, either.
-        if !aims || slices_fold {
+        // Where a half has one period for all of it.
+        let folds = slot.commands && slot.between > 0;
+        if slot.aims || folds {
+            self.look_ahead(input.sample.udc_v, slot);
+        }
+        if !commands || folds {
             self.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
             self.delay = self.delayed();
         }
-        if slot.aims || (slot.commands && slices_fold) {
-            self.look_ahead(input.sample.udc_v, slot);
-        }
-        // Once a half, and not in the longest periods unless all are.
-        if slot.commands && (!aims || slices_fold) {
+        if slot.commands && (!aims || folds) {
             self.learn_angle(measured.angle, here.frame);
         }
-        if let Some(at) = self.pulses.newest().map(|newest| newest.at)
+        if !slot.aims
+            && let Some(at) = self.pulses.newest().map(|newest| newest.at)
             && self.boundary != Some(at)
-            && (aims || !commands)
         {
             self.learn(input.sample, measured.angle, slot, shared);
             self.boundary = Some(at);
