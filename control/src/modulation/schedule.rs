@@ -280,7 +280,7 @@ pub fn index_limit(mode: Mode, rate: f32, devices: &SwitchLimits) -> f32 {
 /// The fundamental that a pattern should have at least, as a share of six-step, with `rate` in angle units per tick: it rises to the whole where
 /// the devices allow three pulses a turn no longer, so that square wave finds the flux linkage that it forces. Below the frequency at which
 /// it begins it is negative, and no bound. Without it the flux linkage had to grow by a quarter within a turn where no torque is wanted and the link is
-/// high: 194 A at 1,750 V, now 94 A, of which square wave itself needs 88 A.
+/// high: 194 A at 1,750 V, now 88 A, which square wave itself needs.
 #[inline(always)]
 pub fn index_floor(rate: f32, devices: &SwitchLimits) -> f32 {
     /// Share of the highest switching frequency where it is nothing, and the one over which it rises to the whole: it is 0.918 where square wave
