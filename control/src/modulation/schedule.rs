@@ -53,6 +53,12 @@ impl Ladder {
         Self(locked)
     }
 
+    /// `true` of optimised patterns.
+    #[cfg(feature = "optimal")]
+    fn is_optimal(&self) -> bool {
+        self.0.first().is_some_and(|lowest| lowest.is_optimal())
+    }
+
     /// The modes, from the lowest frequency up.
     pub fn modes(&self) -> impl Iterator<Item = Mode> {
         [Mode::Async].into_iter().chain(self.0.iter().copied())
@@ -125,10 +131,7 @@ impl Schedule {
         const CARRIER_CATCHES_SHARE: f32 = 0.2;
         /// By how much the modulation index may stay below the operating point's by the map.
         const MAP_ROOM: f32 = 0.02;
-        // What control fills up to, it will need.
-        let floor = index_floor(seen.rate, devices);
-        let index = if floor > seen.modulation_index { floor } else { seen.modulation_index };
-        let seen = &Reference { modulation_index: index, ..*seen };
+        let seen = &Reference { modulation_index: self.filled_index(seen, devices), ..*seen };
         // No branch has less than its smallest index: where the machine has less flux linkage than its map, or the link jumps up, what is
         // made counts, at once.
         let seen = &match mode.branch() {
@@ -161,6 +164,15 @@ impl Schedule {
                 }
             }
         }
+    }
+
+    /// The modulation index that the ladder's borders are held against: the branches of optimised patterns are chosen by what control fills them up to.
+    #[cfg(feature = "optimal")]
+    #[inline(always)]
+    fn filled_index(&self, seen: &Reference, devices: &SwitchLimits) -> f32 {
+        let floor = index_floor(seen.rate, devices);
+        let is_filled = self.ladder.is_optimal() && floor > seen.modulation_index;
+        if is_filled { floor } else { seen.modulation_index }
     }
 
     /// The mode that this reference should have, given the present one; the dwell time is respected.

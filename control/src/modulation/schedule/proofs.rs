@@ -158,6 +158,18 @@ impl Case {
         share(&Reference { rate, ..Reference::NONE }, &self.devices)
     }
 
+    /// The index that is held against the borders: a floor that rises with the frequency lifts the one of optimised patterns.
+    #[cfg(feature = "optimal")]
+    fn index(&self, seen: &Reference) -> f32 {
+        self.schedule().filled_index(seen, &self.devices)
+    }
+
+    /// The index that is held against the borders.
+    #[cfg(not(feature = "optimal"))]
+    fn index(&self, seen: &Reference) -> f32 {
+        seen.modulation_index
+    }
+
     /// Every rate that stands for a cell.
     fn rates(&self) -> Vec<f32> {
         let sides = self.shares().flat_map(|(up, down)| [up, down]);
@@ -198,7 +210,7 @@ impl Case {
         }
         Cell {
             share,
-            index: Passed::of(seen.modulation_index, self.indices(seen.rate)),
+            index: Passed::of(self.index(seen), self.indices(seen.rate)),
             made: (!made.is_nan()).then(|| Passed::of(made, self.indices(0.0))),
         }
     }
