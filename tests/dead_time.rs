@@ -4,7 +4,7 @@ use core::f32::consts::TAU;
 use std::sync::atomic::Ordering;
 use tractive::built_in::traction::BUILT_IN;
 use tractive::drive::PlannedHalf;
-use tractive::drive::traction::{PwmTask, Settings, Shared};
+use tractive::drive::traction::{Drops, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierHalf, Mode, Modulator, Reference, Schedule, SwitchLimits};
 use tractive::ports::PwmPort;
@@ -43,11 +43,11 @@ impl PwmPort for Machine {
     }
 }
 
-/// The halves that are played with a dead time, and their boundaries.
-fn played(dead_time_ticks: u32) -> Vec<(Instant, CarrierHalf)> {
+/// The halves that are played with a dead time and drops, and their boundaries.
+fn played(dead_time_ticks: u32, drops: Drops) -> Vec<(Instant, CarrierHalf)> {
     let devices = SwitchLimits::new(250, dead_time_ticks, 900.0, &CLOCK);
     let half_ticks = devices.shortest_half_ticks;
-    let settings = Settings::new(CLOCK, devices);
+    let settings = Settings { drops, ..Settings::new(CLOCK, devices) };
     let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(half_ticks));
     let mut modulator = Modulator::new(devices, Schedule::new(&CLOCK));
     let (shared, mut machine) = (Shared::new(), Machine::default());
@@ -70,7 +70,7 @@ fn played(dead_time_ticks: u32) -> Vec<(Instant, CarrierHalf)> {
 
 #[test]
 fn every_edge_is_moved_by_what_the_current_in_its_own_half_takes() {
-    let (plain, compensated) = (played(0), played(DEAD_TICKS));
+    let [plain, compensated] = [0, DEAD_TICKS].map(|ticks| played(ticks, Drops::NONE));
     let (mut moved, mut changes) = (0, 0);
     for ((at, half), (_, with)) in plain.iter().zip(&compensated) {
         if half.mode == Mode::Off {
@@ -90,4 +90,12 @@ fn every_edge_is_moved_by_what_the_current_in_its_own_half_takes() {
         }
     }
     assert!(moved > 100 && changes > 10, "{moved} edges moved, {changes} signs changed on the way");
+}
+
+/// A threshold of 0 says that the drops are not known, whatever their slope.
+#[test]
+fn drops_without_a_threshold_are_not_made_up_for() {
+    let [none, slope, both] = [(0.0, 0.0), (0.0, 0.05), (1.5, 0.05)]
+        .map(|(threshold_v, slope_ohm)| played(DEAD_TICKS, Drops { threshold_v, slope_ohm }));
+    assert!(none == slope && none != both);
 }

@@ -47,6 +47,8 @@ struct Fake {
     held: bool,
     /// Compare steps after a peak after which the board begins to look at the gates anew.
     late_steps: u32,
+    /// `true` if control asks the operator, who is told then.
+    operated: bool,
 }
 
 impl Fake {
@@ -66,6 +68,7 @@ impl Fake {
             left: 0,
             held: false,
             late_steps: 0,
+            operated: false,
         }
     }
 
@@ -120,8 +123,8 @@ impl ControlPort<Dual> for Fake {
         sample
     }
 
-    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
-        self.command
+    fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
+        if self.operated { operator() } else { self.command }
     }
 
     fn enter(&mut self, _safe: SafeState, now: Instant) {
@@ -349,6 +352,41 @@ fn disabled_it_makes_no_pulses_and_no_fault() {
     drive.fake.spoil = |_, _| {};
     drive.run(3);
     assert!(!drive.is_off() && drive.fake.report.trip.is_none());
+}
+
+/// Each motor's speed counts: neither may be caught before.
+#[test]
+fn speeds_are_known_once_both_are() {
+    let cases: [(Spoil, bool); 3] = [
+        (|_, command| command.enable = false, true),
+        (|sample, command| (sample.angles[0], command.enable) = (None, false), false),
+        (|sample, command| (sample.angles[1], command.enable) = (None, false), false),
+    ];
+    for (spoil, known) in cases {
+        let (mut fake, mut control) = (Fake::new(), ControlTask::new(&BUILT_IN, SETTINGS));
+        let (mut pwm, shared) = (PwmTask::new(&BUILT_IN, SETTINGS), Shared::new());
+        fake.spoil = spoil;
+        for _ in 0..600 {
+            pwm.run(&mut fake, &shared);
+            control.run(&mut fake, &shared);
+        }
+        assert_eq!((fake.report.speed_known, fake.report.trip), (known, None));
+    }
+}
+
+/// Every tenth period, from the first one on in which it was asked; a board of another's commands never.
+#[test]
+fn the_operator_is_told_once_a_slot_and_only_where_it_commands() {
+    for operated in [false, true] {
+        let mut drive = Drive::pulsing();
+        drive.fake.operated = operated;
+        let told = (0..100).filter(|_| {
+            let now = drive.control.next_call();
+            drive.run(1);
+            drive.shared.operator.has_told(now)
+        });
+        assert_eq!(told.count(), if operated { 10 } else { 0 });
+    }
 }
 
 /// A generator of words, good enough to look everywhere.

@@ -24,8 +24,6 @@ pub(super) struct Steady {
     pub udc_v: f32,
     /// The fundamental of the last operating point, in V.
     pub voltage_v: f32,
-    /// Fundamental that the last operating point would have without a limit, as a share of six-step.
-    pub modulation_index: f32,
 }
 
 /// The volt-seconds of the halves that ended at the newest boundary, and their time, on a link of this voltage and of currents that are so many ticks late. The last half counts where its beginning was the boundary
@@ -73,17 +71,18 @@ pub(super) const NO_LIMITS: ModeLimits = ModeLimits {
     settled: true,
 };
 
-/// The limits that a decided mode sets to control, so long after the last operating point, in s.
+/// The limits that a decided mode sets to control at a speed, for the last operating point's modulation index, so long after it, in s.
 pub(super) fn limits(
     decision: &Decision,
-    steady: &Steady,
+    omega: f32,
+    modulation_index: f32,
     exit: &mut SixStepExit,
     settings: &Settings,
     passed_s: f32,
 ) -> ModeLimits {
     let Settings { clock, devices, .. } = settings;
     let mode = decision.mode;
-    let rate = clock.angle_rate(steady.omega);
+    let rate = clock.angle_rate(omega);
     let largest = index_limit(mode, rate, devices);
     // Edges can move at an optimised pattern's largest index, too.
     let is_all = mode.is_whole() || mode.is_optimal();
@@ -91,13 +90,13 @@ pub(super) fn limits(
     // The last half before another pattern leads to the point that the torque's trim asks for there.
     let trimmed = if mode.is_pattern() && decision.after.is_pattern() { decision.after } else { mode };
     let (index_limit, filled) =
-        exit.fill(mode, [index_floor(rate, devices), largest], steady.modulation_index, passed_s);
+        exit.fill(mode, [index_floor(rate, devices), largest], modulation_index, passed_s);
     ModeLimits {
         follows: follows(mode),
         index_limit,
         steady_share: 1.0,
         filled,
-        ripple_share: ripple_share(trimmed, steady.modulation_index),
+        ripple_share: ripple_share(trimmed, modulation_index),
         settled: exit.is_settled(decision),
     }
 }
@@ -229,4 +228,29 @@ const fn has_path(mode: Mode) -> bool {
 /// The number of half `half` of a mode in the mode that follows.
 fn number(from: Mode, to: Mode, half: u32) -> u32 {
     if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::modulation::CarrierHalf;
+
+    /// A pattern's ripple of a machine that turns backward is that of one that turns forward, upside down.
+    #[test]
+    fn a_ripple_in_the_mirror_is_upside_down() {
+        let steady = Steady { omega: 900.0, udc_v: 1_500.0, voltage_v: 800.0 };
+        let half = |mirrored| Half {
+            at: Instant(0),
+            begins: Instant(1),
+            half: CarrierHalf::off(1),
+            mirrored,
+            volt_ticks: AlphaBeta::default(),
+        };
+        for number in [1, 2, 4, 5] {
+            let [forward, backward] =
+                [false, true].map(|mirrored| half(mirrored).ripple_at(Mode::Mid3, number, &steady));
+            assert_eq!((backward.alpha, backward.beta), (forward.alpha, -forward.beta), "{number}");
+            assert!(forward.beta.abs() > 0.01, "{number}: {forward:?}");
+        }
+    }
 }

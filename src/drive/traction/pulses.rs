@@ -320,6 +320,39 @@ mod tests {
         }
     }
 
+    /// Nobody knows for which boundaries before there was one, and what is planned is not planned again.
+    #[test]
+    fn halves_are_lacking_from_the_first_boundary_on_until_they_are_planned() {
+        let (history, cell) = (History::new(), Planned::new());
+        let (mut pulses, half_ticks) = pulses(10_000.0);
+        let (at, until) = (Instant(half_ticks), Instant(3 * half_ticks));
+        assert!(!pulses.lack(until), "no boundary yet");
+        history.publish(loaded(at, at.after(half_ticks)));
+        pulses.look(&history, at, at.after(1)).unwrap();
+        assert!(pulses.lack(until));
+        pulses.plan(until, &Order { pulses: false, reference: &Reference::NONE, release: 0 }, &cell);
+        assert!(!pulses.lack(until) && pulses.lack(until.after(1)));
+    }
+
+    /// A boundary is known by its own instant and by the next one's: of a timer that does not end its half as planned nothing is known.
+    #[test]
+    fn a_boundary_that_is_not_as_planned_begins_anew() {
+        for (late, early) in [(0, 0), (0, 7), (7, 0)] {
+            let (history, cell) = (History::new(), Planned::new());
+            let (mut pulses, half_ticks) = pulses(10_000.0);
+            let [first, second, third, fourth] = [1, 2, 3, 4].map(|half| Instant(half * half_ticks));
+            history.publish(loaded(first, second));
+            pulses.look(&history, first, first.after(1)).unwrap();
+            let reference = Reference::turning(100.0, crate::frames::Angle::ZERO, 0.0, first, 1_500.0);
+            pulses.plan(fourth, &Order { pulses: true, reference: &reference, release: 0 }, &cell);
+            history.publish(loaded(second.after(late), third.before(early)));
+            let mode = pulses.look(&history, third, third.after(1)).unwrap().mode;
+            let newest = pulses.newest().unwrap();
+            assert_eq!((newest.at, newest.begins), (second.after(late), third.before(early)));
+            assert_eq!((mode, newest.is_off()), (Mode::Off, (late, early) != (0, 0)), "{late} {early}");
+        }
+    }
+
     /// The boundaries of a PWM timer against control, for so many periods: each finds its half, and control knows it again. Returns how many.
     fn drive(mut pulses: Pulses, half_ticks: u32, rate: f32) -> u32 {
         let (history, planned) = (History::new(), Planned::new());

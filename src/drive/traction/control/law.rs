@@ -126,14 +126,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let Settings { gains, clock, .. } = &self.settings;
         let (omega, udc_v) = (self.controller.omega(), sample.udc_v);
         let tables = self.machine.tables();
-        let steady = Steady {
-            omega,
-            udc_v: udc_v * self.link_scale,
-            voltage_v: self.steady_v,
-            modulation_index: self.modulation_index,
-        };
         let passed_s = self.controller.passed_s(clock);
-        self.limits = limits(&slot.key, &steady, &mut self.exit, &self.settings, passed_s);
+        self.limits =
+            limits(&slot.key, omega, self.modulation_index, &mut self.exit, &self.settings, passed_s);
         let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
         let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
         let demand = Demand { torque_nm, ..command.demand };
@@ -166,8 +161,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let Ahead { committed_v, next_v } = self.ahead;
         let omega = self.controller.omega();
         let udc_v = (sample.udc_v + next_v) * self.link_scale;
-        let steady =
-            Steady { omega, udc_v, voltage_v: self.steady_v, modulation_index: self.modulation_index };
+        let steady = Steady { omega, udc_v, voltage_v: self.steady_v };
         let (mode, revises) = (slot.key.mode, self.revises);
         let committed_v = (sample.udc_v + committed_v) * self.link_scale;
         let wanted =
@@ -245,5 +239,33 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             ..Reference::NONE
         };
         self.harmonics.pause();
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+    use crate::frames::Abc;
+    use crate::modulation::SwitchLimits;
+    use crate::time::Clock;
+
+    /// The mode that pulses would begin with goes by the machine's own EMF, and the start's pulses turn with it from where currents were taken.
+    #[test]
+    fn at_rest_the_reference_turns_with_the_machine_without_voltage() {
+        let clock = Clock::new(25_000_000, 2_500);
+        let devices = SwitchLimits::new(250, 0, 900.0, &clock);
+        let settings = Settings { current_filter_ticks: 300, ..Settings::new(clock, devices) };
+        let mut task = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
+        let (now, omega, angle) = (Instant(1_000_000), -1_000.0, Angle(0x2345_6789));
+        task.rest(now, omega, &Measurements { currents_a: Abc::default(), udc_v: 1_500.0, angle });
+        let Reference { voltage_v, vector, carrier_angle, rate, at, udc_v, modulation_index } =
+            task.reference;
+        assert_eq!((voltage_v, vector.squared(), carrier_angle, udc_v), (0.0, 0.0, angle, 1_500.0));
+        assert_eq!((rate, at), (clock.angle_rate(omega), now.before(task.delay.ticks)));
+        assert!(task.delay.ticks > 250);
+        // 1,000 rad/s of the magnets' flux linkage over 2/π of the link.
+        let emf = 1_000.0 * BUILT_IN.ratings.magnet_flux_wb / 954.93;
+        assert!((modulation_index / emf - 1.0).abs() < 1e-4, "{modulation_index}, not {emf}");
     }
 }

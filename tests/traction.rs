@@ -1,0 +1,292 @@
+//! The traction drive with one thing out of the ordinary: a motor that turns steadily, and a setting, a sample or a command that another drive has not.
+
+use std::f32::consts::TAU;
+use tractive::built_in::traction::BUILT_IN;
+use tractive::control::{Demand, Gains, Warmth};
+use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
+use tractive::frames::{Abc, Angle, Dq, six_step_v};
+use tractive::modulation::{CarrierHalf, Mode, SwitchLimits, index_limit};
+use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
+use tractive::protection::{Fault, SafeState, Trip};
+use tractive::recorder::{Record, Recorder};
+use tractive::time::{Clock, Instant};
+
+const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+const SETTLED: u32 = 2_000_000;
+/// Current that goes on to flow through the diodes in the tests that ask for one.
+const DIODES_A: Abc = Abc { a: 100.0, b: -50.0, c: -50.0 };
+
+fn settings(max_hz: f32) -> Settings {
+    Settings::new(CLOCK, SwitchLimits::new(250, 0, max_hz, &CLOCK))
+}
+
+/// A motor that turns steadily and carries a steady current, and what a test does to a sample and its command.
+struct Motor<'a> {
+    omega: f32,
+    spoil: &'a dyn Fn(u32, &mut Sample, &mut DriveCommand),
+    /// Current while the gates are off, from [`SETTLED`] on.
+    open_a: Abc,
+    /// An instant, and by how many ticks control ends too late there.
+    late: Option<(u32, u32)>,
+    sample: (Sample, DriveCommand),
+    played: CarrierHalf,
+    entered: Vec<(SafeState, u32)>,
+    report: Report,
+    largest_v: f32,
+}
+
+impl<'a> Motor<'a> {
+    fn new(omega: f32, spoil: &'a dyn Fn(u32, &mut Sample, &mut DriveCommand)) -> Self {
+        let currents_a = Abc::default();
+        let sample = Sample { currents_a, udc_v: 1_500.0, angle: None, may_pulse: true, hardware: None };
+        Self {
+            omega,
+            spoil,
+            open_a: Abc::default(),
+            late: None,
+            sample: (sample, DriveCommand::NONE),
+            played: CarrierHalf::default(),
+            entered: Vec::new(),
+            report: Report::default(),
+            largest_v: 0.0,
+        }
+    }
+
+    fn angle(&self, now: Instant) -> Angle {
+        let turns = f64::from(self.omega) * f64::from(now.0) / 25e6 / f64::from(TAU);
+        Angle((turns.rem_euclid(1.0) * 4_294_967_296.0) as u64 as u32)
+    }
+
+    fn currents(&self, now: Instant) -> Abc {
+        match self.played.mode {
+            Mode::Off if now.0 < SETTLED => Abc::default(),
+            Mode::Off => self.open_a,
+            _ => {
+                let ripple = (now.0 % 7_919) as f32 * 1e-4;
+                (Dq { d: ripple - 30.0, q: 40.0 - ripple }).unpark(self.angle(now).sin_cos()).abc()
+            }
+        }
+    }
+
+    /// Both interrupts in their order until an instant; control comes no more from another one on. Returns the trip of who still comes.
+    fn drive(
+        &mut self,
+        mut tasks: (ControlTask, PwmTask),
+        shared: &Shared,
+        end: u32,
+        lost: u32,
+    ) -> Option<Trip> {
+        let (control, pwm) = (&mut tasks.0, &mut tasks.1);
+        while control.next_call().0.min(pwm.next_call().0) < end {
+            let lives = control.next_call().0 < lost;
+            if !lives || control.next_call().reached(pwm.next_call()) {
+                pwm.run(self, shared);
+                if !lives && pwm.next_call().0 > end {
+                    return pwm.trip();
+                }
+            } else {
+                control.run(self, shared);
+            }
+        }
+        control.trip()
+    }
+
+    /// The same of the usual tasks, with control for ever.
+    fn runs(&mut self, settings: Settings, end: u32) -> Option<Trip> {
+        self.drive(tasks(settings), &Shared::new(), end, u32::MAX)
+    }
+}
+
+fn tasks(settings: Settings) -> (ControlTask, PwmTask) {
+    let first = Instant(settings.devices.shortest_half_ticks);
+    (ControlTask::new(&BUILT_IN, settings, Instant(2_500)), PwmTask::new(&BUILT_IN, settings, first))
+}
+
+impl ControlPort for Motor<'_> {
+    fn sample(&mut self, now: Instant) -> Sample {
+        let (sample, command) = (
+            Sample {
+                currents_a: self.currents(now),
+                udc_v: 1_500.0,
+                angle: Some(self.angle(now)),
+                may_pulse: true,
+                hardware: None,
+            },
+            DriveCommand {
+                enable: true,
+                demand: Demand { torque_nm: 200.0, slew_limited: true },
+                ..DriveCommand::NONE
+            },
+        );
+        self.sample = (sample, command);
+        (self.spoil)(now.0, &mut self.sample.0, &mut self.sample.1);
+        self.sample.0
+    }
+
+    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        self.sample.1
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        self.entered.push((safe, now.0));
+    }
+
+    fn overrun_ticks(&mut self, now: Instant, _deadline_ticks: u32) -> u32 {
+        self.late.filter(|(at, _)| now.0 == *at).map_or(0, |(_, ticks)| ticks)
+    }
+
+    fn report(&mut self, _now: Instant, report: impl FnOnce() -> Report) {
+        self.report = report();
+        self.largest_v = self.largest_v.max(self.report.voltage_v);
+    }
+
+    /// A sensor that only counts, of a rotor that stands.
+    fn turned(&mut self) -> Option<Angle> {
+        self.sample.0.angle.is_none().then_some(Angle::ZERO)
+    }
+}
+
+impl PwmPort for Motor<'_> {
+    fn sample(&mut self, now: Instant) -> Abc {
+        self.currents(now)
+    }
+
+    fn play(&mut self, _now: Instant, next: &CarrierHalf) {
+        self.played = *next;
+    }
+
+    fn enter(&mut self, safe: SafeState, now: Instant) {
+        self.entered.push((safe, now.0));
+    }
+}
+
+/// Electrical speed between half of the one from which diodes rectify and the one from which they would be shorted at once.
+const HOLDING: f32 = 1_200.0;
+
+/// Gates off first, and the short circuit once the rotor has turned around, which the trip says from then on.
+fn is_shorted_after_a_turn(motor: &Motor, trip: Option<Trip>, fault: Fault, period_ticks: u32) {
+    let trip = trip.expect("a fault");
+    let [(SafeState::GatesOff, off), (SafeState::ShortCircuit, short)] = motor.entered[..] else {
+        panic!("{:?}", motor.entered)
+    };
+    assert_eq!((trip.fault, trip.safe, trip.at.0), (fault, SafeState::ShortCircuit, off));
+    let turn = (TAU / HOLDING * 25e6) as u32;
+    assert!((short - off).abs_diff(turn) < period_ticks, "after {} ticks, not {turn}", short - off);
+}
+
+#[test]
+fn a_current_that_stays_after_a_trip_of_control_is_shorted() {
+    let over = |at: u32, sample: &mut Sample, _: &mut DriveCommand| {
+        if at >= SETTLED {
+            sample.udc_v = 2_200.0;
+        }
+    };
+    let mut motor = Motor { open_a: DIODES_A, ..Motor::new(HOLDING, &over) };
+    let trip = motor.runs(settings(900.0), SETTLED + 400_000);
+    is_shorted_after_a_turn(&motor, trip, Fault::DcOvervoltage, 2_500);
+}
+
+#[test]
+fn a_current_that_stays_where_control_is_lost_is_shorted_by_the_other_interrupt() {
+    let mut motor = Motor { open_a: DIODES_A, ..Motor::new(HOLDING, &|_, _, _| {}) };
+    let trip = motor.drive(tasks(settings(900.0)), &Shared::new(), SETTLED + 600_000, SETTLED);
+    is_shorted_after_a_turn(&motor, trip, Fault::StaleCommand, 13_889);
+}
+
+#[test]
+fn without_pulses_nobody_misses_control() {
+    let off = |_: u32, _: &mut Sample, command: &mut DriveCommand| command.enable = false;
+    let mut motor = Motor::new(HOLDING, &off);
+    assert_eq!(motor.drive(tasks(settings(900.0)), &Shared::new(), SETTLED + 400_000, SETTLED), None);
+    assert!(motor.entered.is_empty());
+}
+
+/// Control's own angle moves on with the speed where the sensor's stands.
+#[test]
+fn an_angle_that_stands_is_found_as_the_sensor_shows_it() {
+    let stuck = Motor::new(20.0, &|_, _, _| {}).angle(Instant(SETTLED));
+    let freeze = |at: u32, sample: &mut Sample, _: &mut DriveCommand| {
+        if at >= SETTLED {
+            sample.angle = Some(stuck);
+        }
+    };
+    let late = Settings { angle_late_s: 60e-6, ..settings(900.0) };
+    let trip = Motor::new(20.0, &freeze).runs(late, SETTLED + 140 * 2_500);
+    assert_eq!(trip.map(|trip| trip.fault), Some(Fault::Frozen));
+}
+
+fn recorded(motor: &mut Motor) -> Vec<Record> {
+    let recorder = Recorder::new();
+    motor.drive(tasks(settings(900.0)), &Shared::recorded_by(&recorder), SETTLED + 100_000, u32::MAX);
+    (0..).map_while(|index| recorder.read(index)).collect()
+}
+
+#[test]
+fn the_flight_recorder_knows_whether_control_asked_for_pulses() {
+    let off = |at: u32, sample: &mut Sample, command: &mut DriveCommand| {
+        command.enable = false;
+        sample.udc_v = if at >= SETTLED { 2_200.0 } else { 1_500.0 };
+    };
+    let records = recorded(&mut Motor::new(400.0, &off));
+    assert!(records.len() == 256 && records.iter().all(|record| !record.state.pulsing));
+    let mut late = Motor { late: Some((SETTLED, 40)), ..Motor::new(400.0, &|_, _, _| {}) };
+    for record in recorded(&mut late) {
+        let (state, faulty) = (record.state, record.at.0 >= SETTLED);
+        let fault = faulty.then_some(Fault::ControlDeadline);
+        assert_eq!((state.pulsing, state.fault), (!faulty, fault), "{}", record.at.0);
+    }
+}
+
+#[test]
+fn a_machine_whose_temperatures_are_no_longer_known_is_as_rated() {
+    const WARM: core::ops::Range<u32> = 4 * SETTLED..5 * SETTLED;
+    let warm = |at: u32, _: &mut Sample, command: &mut DriveCommand| {
+        command.warmth = if WARM.contains(&at) { Warmth::new(1.4, -0.15) } else { Warmth::NONE };
+    };
+    let current = |end| {
+        let mut motor = Motor::new(200.0, &warm);
+        assert_eq!(motor.runs(settings(900.0), end), None);
+        Dq { d: motor.report.id_a, q: motor.report.iq_a }
+    };
+    let [before, warm, after] = [WARM.start, WARM.end, WARM.end + 2 * SETTLED].map(current);
+    let apart = |a: Dq, b: Dq| (a - b).length();
+    assert!(apart(before, warm) > 2.0 && apart(before, after) < 0.2, "{before:?} {warm:?} {after:?}");
+}
+
+/// Largest change of the torque's reference that a swinging link makes.
+fn swung_nm(link_damping: f32) -> f32 {
+    let swing = |at: u32, sample: &mut Sample, _: &mut DriveCommand| {
+        sample.udc_v = 1_500.0 + 30.0 * (TAU * 40.0 * at as f32 / 25e6).sin();
+    };
+    let settings = Settings { gains: Gains { link_damping, ..Gains::DEFAULT }, ..settings(900.0) };
+    let torque = |periods: u32| {
+        let mut motor = Motor::new(400.0, &swing);
+        assert_eq!(motor.runs(settings, SETTLED + periods * 2_500), None);
+        motor.report.torque_nm
+    };
+    let torques: Vec<_> = (0..10).map(|tenth| torque(25 * tenth)).collect();
+    torques.iter().copied().fold(f32::MIN, f32::max) - torques.iter().copied().fold(f32::MAX, f32::min)
+}
+
+#[test]
+fn a_link_that_swings_is_damped_by_torque_where_it_is_wanted() {
+    let [without, with] = [0.0, 1.0].map(swung_nm);
+    assert!(without < 0.1 && with > 2.0, "{without} N·m without, {with} N·m with");
+}
+
+/// The start of a sensor that only counts: a pulse takes as many commands as its volt-seconds need at the largest voltage.
+#[test]
+fn pulses_of_the_start_keep_within_the_largest_voltage_of_a_carrier() {
+    let quick = settings(9_000.0);
+    for (udc_v, commands) in [(900.0, 2.0), (1_200.0, 2.0), (1_380.0, 2.0), (1_400.0, 1.0), (1_500.0, 1.0)] {
+        let counts = |_: u32, sample: &mut Sample, _: &mut DriveCommand| {
+            (sample.angle, sample.udc_v) = (None, udc_v);
+        };
+        let mut motor = Motor::new(0.0, &counts);
+        motor.runs(quick, 2 * SETTLED);
+        let pulse_v = 0.17 * BUILT_IN.ratings.magnet_flux_wb / CLOCK.control_s() / commands;
+        let limit_v = 0.95 * index_limit(Mode::Async, 0.0, &quick.devices) * six_step_v(udc_v);
+        assert!((motor.largest_v - pulse_v).abs() < 0.1, "{udc_v} V: {} V, not {pulse_v} V", motor.largest_v);
+        assert!(motor.largest_v < limit_v, "{udc_v} V: {} V of {limit_v} V", motor.largest_v);
+    }
+}
