@@ -223,7 +223,9 @@ const SPEED_SPAN: f32 = 0.05;
 #[inline(never)]
 fn wrong_with(request: &Request, ratings: &Ratings) -> Option<Refusal> {
     let Limits { motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v } = request.limits;
-    let sum = request.torque_nm + motoring_nm + braking_nm + speed_rad_s + link_low_v + link_high_v;
+    // Not finite if one is not.
+    let sum: f32 =
+        [request.torque_nm, motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v].iter().sum();
     if !sum.is_finite() {
         return Some(Refusal::RequestNotFinite);
     }

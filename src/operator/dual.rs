@@ -207,11 +207,12 @@ impl Demands for DualDemands {
     fn wrong_with(request: &DualRequest, settings: &Settings) -> Option<Refusal> {
         let ratings = settings.ratings;
         let [m1, m2] = &request.motors;
-        let sum = |motor: &MotorRequest| {
+        let sum = |motor: &MotorRequest| -> f32 {
             let MotorLimits { motoring_nm, braking_nm, speed_rad_s } = motor.limits;
-            motor.wanted.value() + motoring_nm + braking_nm + speed_rad_s
+            [motor.wanted.value(), motoring_nm, braking_nm, speed_rad_s].iter().sum()
         };
-        if !(sum(m1) + sum(m2) + request.link_ref_v).is_finite() {
+        // Not finite if one is not.
+        if ![sum(m1), sum(m2), request.link_ref_v].iter().sum::<f32>().is_finite() {
             return Some(Refusal::RequestNotFinite);
         }
         let [low_v, high_v, _] = dual::Settings::link_range_v(ratings);

@@ -193,7 +193,7 @@ pub struct Seen {
 }
 
 /// Flags as bits of a word, the first the lowest.
-fn bits<const N: usize>(flags: [bool; N]) -> u32 {
+pub(super) fn bits<const N: usize>(flags: [bool; N]) -> u32 {
     flags.into_iter().rev().fold(0, |word, flag| word << 1 | u32::from(flag))
 }
 

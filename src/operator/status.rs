@@ -1,5 +1,6 @@
 //! The operator's status.
 
+use super::request::bits;
 use crate::control::Demand;
 use crate::ports::MotorDemand;
 use crate::protection::Trip;
@@ -140,7 +141,7 @@ pub struct Status<T = f32> {
     pub temperatures: Option<Temperatures>,
 }
 
-const NONE: u32 = 0xFF;
+const NONE: u8 = 0xFF;
 
 /// The status of the ZS9's operator.
 pub type DualStatus = Status<[MotorDemand; 2]>;
@@ -186,11 +187,10 @@ impl<T: DemandWords> Status<T> {
     /// As nine words.
     pub fn to_words(&self) -> [u32; 9] {
         let Self { state, trip, refusal, refusals, torque_nm, switches, temperatures: _ } = *self;
-        let refusal = refusal.map_or(NONE, |refusal| refusal.code().into());
         let Switches { precharge, main, discharge, chopper } = switches;
-        let flags = u32::from(precharge) | u32::from(main) << 1 | u32::from(discharge) << 2;
+        let flags = bits([precharge, main, discharge]) as u8;
         let [fault, value, limit, at] = trip_to_words(trip);
-        let codes = u32::from(state.code()) | refusal << 8 | flags << 16;
+        let codes = u32::from_le_bytes([state.code(), refusal.map_or(NONE, Refusal::code), flags, 0]);
         let [first, second] = torque_nm.to_words();
         [codes, refusals, first, second, chopper.to_bits(), fault, value, limit, at]
     }
@@ -198,13 +198,14 @@ impl<T: DemandWords> Status<T> {
     /// The inverse of [`Self::to_words`]; `None` for words that are none of ours.
     pub fn from_words(words: [u32; 9]) -> Option<Self> {
         let [codes, refusals, first, second, chopper, trip @ ..] = words;
-        let refusal = match codes >> 8 & 0xFF {
+        let [state, refusal, flags, _] = codes.to_le_bytes();
+        let refusal = match refusal {
             NONE => None,
-            code => Some(Refusal::from_code(code)?),
+            code => Some(Refusal::from_code(code.into())?),
         };
-        let flag = |bit: u32| codes >> (16 + bit) & 1 != 0;
+        let flag = |bit: u32| flags >> bit & 1 != 0;
         Some(Self {
-            state: State::from_code(codes & 0xFF)?,
+            state: State::from_code(state.into())?,
             trip: trip_from_words(trip),
             refusal,
             refusals,
@@ -257,5 +258,17 @@ mod tests {
             }
         }
         assert_eq!(Status::<f32>::from_words([0xFE; 9]), None);
+    }
+
+    /// Its kind takes the place of a mantissa's last bit, set or not.
+    #[test]
+    fn a_demand_keeps_its_kind_whatever_its_last_bit_is() {
+        let even = 0x42D1_0000;
+        for bits in [even, even | 1] {
+            let torque = |bits| Demand { torque_nm: f32::from_bits(bits), slew_limited: true };
+            let demands = [MotorDemand::Torque(torque(bits)), MotorDemand::Speed(f32::from_bits(bits))];
+            let kept = [MotorDemand::Torque(torque(even)), MotorDemand::Speed(f32::from_bits(even))];
+            assert_eq!(<[MotorDemand; 2]>::from_words(demands.to_words()), kept);
+        }
     }
 }
