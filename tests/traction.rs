@@ -28,7 +28,9 @@ struct Motor<'a> {
     open_a: Abc,
     /// An instant, and by how many ticks control ends too late there.
     late: Option<(u32, u32)>,
-    sample: (Sample, DriveCommand),
+    command: DriveCommand,
+    /// `true` if the sensor only counts, of a rotor that stands.
+    counts: bool,
     played: CarrierHalf,
     entered: Vec<(SafeState, u32)>,
     report: Report,
@@ -37,14 +39,13 @@ struct Motor<'a> {
 
 impl<'a> Motor<'a> {
     fn new(omega: f32, spoil: &'a dyn Fn(u32, &mut Sample, &mut DriveCommand)) -> Self {
-        let currents_a = Abc::default();
-        let sample = Sample { currents_a, udc_v: 1_500.0, angle: None, may_pulse: true, hardware: None };
         Self {
             omega,
             spoil,
             open_a: Abc::default(),
             late: None,
-            sample: (sample, DriveCommand::NONE),
+            command: DriveCommand::NONE,
+            counts: false,
             played: CarrierHalf::default(),
             entered: Vec::new(),
             report: Report::default(),
@@ -68,63 +69,44 @@ impl<'a> Motor<'a> {
         }
     }
 
-    /// Both interrupts in their order until an instant; control comes no more from another one on. Returns the trip of who still comes.
-    fn drive(
-        &mut self,
-        mut tasks: (ControlTask, PwmTask),
-        shared: &Shared,
-        end: u32,
-        lost: u32,
-    ) -> Option<Trip> {
-        let (control, pwm) = (&mut tasks.0, &mut tasks.1);
-        while control.next_call().0.min(pwm.next_call().0) < end {
-            let lives = control.next_call().0 < lost;
-            if !lives || control.next_call().reached(pwm.next_call()) {
-                pwm.run(self, shared);
-                if !lives && pwm.next_call().0 > end {
-                    return pwm.trip();
-                }
-            } else {
+    /// Both interrupts in their order until an instant; control comes no more from another one on. Returns the trip.
+    fn drive(&mut self, settings: Settings, shared: &Shared, end: u32, lost: u32) -> Option<Trip> {
+        let first = Instant(settings.devices.shortest_half_ticks);
+        let mut pwm = PwmTask::new(&BUILT_IN, settings, first);
+        let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
+        loop {
+            let (control_at, pwm_at) = (control.next_call(), pwm.next_call());
+            let is_control = control_at.0 < lost && !control_at.reached(pwm_at);
+            if (if is_control { control_at } else { pwm_at }).0 >= end {
+                return control.trip().or(pwm.trip());
+            }
+            if is_control {
                 control.run(self, shared);
+            } else {
+                pwm.run(self, shared);
             }
         }
-        control.trip()
     }
 
-    /// The same of the usual tasks, with control for ever.
+    /// The same with control for ever.
     fn runs(&mut self, settings: Settings, end: u32) -> Option<Trip> {
-        self.drive(tasks(settings), &Shared::new(), end, u32::MAX)
+        self.drive(settings, &Shared::new(), end, u32::MAX)
     }
-}
-
-fn tasks(settings: Settings) -> (ControlTask, PwmTask) {
-    let first = Instant(settings.devices.shortest_half_ticks);
-    (ControlTask::new(&BUILT_IN, settings, Instant(2_500)), PwmTask::new(&BUILT_IN, settings, first))
 }
 
 impl ControlPort for Motor<'_> {
     fn sample(&mut self, now: Instant) -> Sample {
-        let (sample, command) = (
-            Sample {
-                currents_a: self.currents(now),
-                udc_v: 1_500.0,
-                angle: Some(self.angle(now)),
-                may_pulse: true,
-                hardware: None,
-            },
-            DriveCommand {
-                enable: true,
-                demand: Demand { torque_nm: 200.0, slew_limited: true },
-                ..DriveCommand::NONE
-            },
-        );
-        self.sample = (sample, command);
-        (self.spoil)(now.0, &mut self.sample.0, &mut self.sample.1);
-        self.sample.0
+        let (currents_a, angle) = (self.currents(now), Some(self.angle(now)));
+        let mut sample = Sample { currents_a, udc_v: 1_500.0, angle, may_pulse: true, hardware: None };
+        let demand = Demand { torque_nm: 200.0, slew_limited: true };
+        self.command = DriveCommand { enable: true, demand, ..DriveCommand::NONE };
+        (self.spoil)(now.0, &mut sample, &mut self.command);
+        self.counts = sample.angle.is_none();
+        sample
     }
 
     fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
-        self.sample.1
+        self.command
     }
 
     fn enter(&mut self, safe: SafeState, now: Instant) {
@@ -140,9 +122,8 @@ impl ControlPort for Motor<'_> {
         self.largest_v = self.largest_v.max(self.report.voltage_v);
     }
 
-    /// A sensor that only counts, of a rotor that stands.
     fn turned(&mut self) -> Option<Angle> {
-        self.sample.0.angle.is_none().then_some(Angle::ZERO)
+        self.counts.then_some(Angle::ZERO)
     }
 }
 
@@ -189,7 +170,7 @@ fn a_current_that_stays_after_a_trip_of_control_is_shorted() {
 #[test]
 fn a_current_that_stays_where_control_is_lost_is_shorted_by_the_other_interrupt() {
     let mut motor = Motor { open_a: DIODES_A, ..Motor::new(HOLDING, &|_, _, _| {}) };
-    let trip = motor.drive(tasks(settings(900.0)), &Shared::new(), SETTLED + 600_000, SETTLED);
+    let trip = motor.drive(settings(900.0), &Shared::new(), SETTLED + 600_000, SETTLED);
     is_shorted_after_a_turn(&motor, trip, Fault::StaleCommand, 13_889);
 }
 
@@ -197,7 +178,7 @@ fn a_current_that_stays_where_control_is_lost_is_shorted_by_the_other_interrupt(
 fn without_pulses_nobody_misses_control() {
     let off = |_: u32, _: &mut Sample, command: &mut DriveCommand| command.enable = false;
     let mut motor = Motor::new(HOLDING, &off);
-    assert_eq!(motor.drive(tasks(settings(900.0)), &Shared::new(), SETTLED + 400_000, SETTLED), None);
+    assert_eq!(motor.drive(settings(900.0), &Shared::new(), SETTLED + 400_000, SETTLED), None);
     assert!(motor.entered.is_empty());
 }
 
@@ -217,7 +198,7 @@ fn an_angle_that_stands_is_found_as_the_sensor_shows_it() {
 
 fn recorded(motor: &mut Motor) -> Vec<Record> {
     let recorder = Recorder::new();
-    motor.drive(tasks(settings(900.0)), &Shared::recorded_by(&recorder), SETTLED + 100_000, u32::MAX);
+    motor.drive(settings(900.0), &Shared::recorded_by(&recorder), SETTLED + 100_000, u32::MAX);
     (0..).map_while(|index| recorder.read(index)).collect()
 }
 
