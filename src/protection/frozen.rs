@@ -174,4 +174,16 @@ mod tests {
             assert_eq!(watch.check(&measured, 0.0, 1e-4, ratings).is_some(), found);
         }
     }
+
+    /// A volt more adds up and fades: to 63 % of what it comes to in the time for which it counts.
+    #[test]
+    fn a_push_counts_for_as_long_as_it_is_believed() {
+        let [none, more] = [0.0, 1.0].map(|alpha| AlphaBeta { alpha, beta: 0.0 });
+        let mut repeated = Repeated { periods: 1, ..Repeated::since(none) };
+        for (periods, wb) in [(200, 0.632 * BELIEVED_S), (1_800, BELIEVED_S)] {
+            (0..periods).for_each(|_| repeated.step(more, 0.0, 1e-4));
+            let pushed_wb = repeated.pushed_wb.alpha;
+            assert!((pushed_wb / wb - 1.0).abs() < 5e-3, "{pushed_wb} V·s, not {wb}");
+        }
+    }
 }
