@@ -73,11 +73,11 @@ impl Feedback {
 /// The feedback of two words; nothing seen if one of them is missing or has no mark.
 #[inline]
 pub fn decoded(words: [Option<u16>; 2]) -> GateFeedback {
-    match words {
-        [Some(on), Some(off)] if on & !GATES == FIRST_MARK && off & !GATES == SECOND_MARK => {
-            GateFeedback { on: on & GATES, off: off & GATES }
-        }
-        _ => GateFeedback::default(),
+    let [Some(on), Some(off)] = words else { return GateFeedback::default() };
+    if on & !GATES == FIRST_MARK && off & !GATES == SECOND_MARK {
+        GateFeedback { on: on & GATES, off: off & GATES }
+    } else {
+        GateFeedback::default()
     }
 }
 
