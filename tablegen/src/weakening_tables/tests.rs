@@ -227,14 +227,14 @@ fn saturated(mut machine: MachineFolder) -> MachineFolder {
 /// A machine that is not done with being made narrower once.
 #[test]
 fn circles_are_made_anew_until_nothing_exceeds() {
-    let mut machine = saturated(with_map(Linear { ld_h: 0.002, lq_h: 0.03, psi_m_wb: 0.02 }));
-    (machine.parameters.min_id_a, machine.parameters.dc_link_min_v) = (-12.0, 30.0);
+    let mut machine = with_map(Linear { ld_h: 0.002, lq_h: 0.03, psi_m_wb: 0.02 });
+    machine.parameters.dc_link_min_v = 30.0;
     let smooth = SmoothMap::new(&machine.map);
-    let mut circles = Circles::new(&machine, &smooth, 0.5);
+    let mut circles = Circles::new(&machine, &smooth, 0.1);
     let rounds = (0..ROUNDS).take_while(|_| circles.narrow()).count();
     assert!((2..ROUNDS).contains(&rounds), "{rounds}");
     let mtpa = MtpaCurrents { last_torque_nm: 60.0, currents_a: vec![(0.0, 0.0), (-5.0, 15.0)] };
-    let tables = weakening_tables(&machine, &smooth, 0.5, &mtpa);
+    let tables = weakening_tables(&machine, &smooth, 0.1, &mtpa);
     let nodes = circles.rows.iter().flat_map(|row| &row.nodes);
     let wanted: Vec<_> = nodes.map(|(id, effective)| [*id as f32, *effective as f32]).collect();
     assert_eq!(tables.currents.nodes, wanted);
