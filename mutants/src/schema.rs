@@ -239,6 +239,22 @@ mod tests {
         );
     }
 
+    /// What is written twice, a place or a base, has no mutants in it.
+    #[test]
+    fn every_mutant_that_can_be_chosen_is_written() {
+        let source = "fn f(x: &mut [T], n: N) -> S { x[n - 1] /= x[n + 1]; S { a: n * 2, ..g(n % 3) } }";
+        let text = schema(source);
+        let mut number = 0;
+        for site in sites::of(source).unwrap() {
+            for found in &site.mutants {
+                number += 1;
+                let is_written = text.contains(&format!("is({number})"));
+                assert_eq!(is_written, !matches!(site.shape, Shape::Fixed), "{}: {text}", found.what);
+            }
+        }
+        assert!(number > 10);
+    }
+
     #[test]
     fn every_shape_stays_a_program() {
         let text = schema(

@@ -135,9 +135,7 @@ impl Finder {
         let shape = match binary.op {
             BinOp::And(_) | BinOp::Or(_) if has_let(&binary.left) || has_let(&binary.right) => return,
             BinOp::And(_) | BinOp::Or(_) => Shape::Lazy { right, and: matches!(binary.op, BinOp::And(_)) },
-            _ if own.ends_with('=') && !matches!(own.as_str(), "==" | "!=" | "<=" | ">=") => {
-                Shape::Assignment { right, own, others }
-            }
+            op if assigns(&op) => Shape::Assignment { right, own, others },
             _ => Shape::Operator { right, own, others },
         };
         self.add(&binary.op, place, left.end, shape, whats);
@@ -285,14 +283,20 @@ impl<'ast> Visit<'ast> for Finder {
         }
     }
 
+    /// The base is written twice, as it is.
     fn visit_expr_struct(&mut self, structure: &'ast syn::ExprStruct) {
         self.fields(structure);
-        visit::visit_expr_struct(self, structure);
+        structure.fields.iter().for_each(|field| self.visit_field_value(field));
+        self.constant(|finder| structure.rest.iter().for_each(|base| finder.visit_expr(base)));
     }
 
+    /// The place of an assignment is written for each mutant, as it is.
     fn visit_expr_binary(&mut self, binary: &'ast syn::ExprBinary) {
         self.binary(binary);
-        visit::visit_expr_binary(self, binary);
+        self.fixed += usize::from(assigns(&binary.op));
+        self.visit_expr(&binary.left);
+        self.fixed -= usize::from(assigns(&binary.op));
+        self.visit_expr(&binary.right);
     }
 
     fn visit_expr_unary(&mut self, unary: &'ast syn::ExprUnary) {
@@ -316,6 +320,12 @@ fn has_let(expr: &Expr) -> bool {
         Expr::Binary(binary) => has_let(&binary.left) || has_let(&binary.right),
         _ => false,
     }
+}
+
+/// `+=` and the like.
+fn assigns(op: &BinOp) -> bool {
+    let text = op.to_token_stream().to_string();
+    text.ends_with('=') && !matches!(text.as_str(), "==" | "!=" | "<=" | ">=")
 }
 
 /// The operators in place of one.

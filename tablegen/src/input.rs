@@ -22,3 +22,17 @@ pub fn read_bounded(file: &Path) -> Result<Vec<u8>> {
     }
     Ok(bytes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_may_be_as_long_as_the_limit() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        for (bytes, good) in [(LARGEST_BYTES, true), (LARGEST_BYTES + 1, false)] {
+            file.as_file().set_len(bytes).unwrap();
+            assert_eq!(read_bounded(file.path()).is_ok(), good, "{bytes}");
+        }
+    }
+}

@@ -60,10 +60,10 @@ pub fn circle(
 /// Stands for no torque where something divides by it.
 const TINY_TORQUE_NM: f64 = 1e-3;
 
-/// The part of the circle where torque rises from nothing to its most, within the limits.
+/// The part of the circle where torque rises to its most, within the limits.
 ///
 /// On a circle wider than the magnet's flux the smallest load angles need id > 0, where reluctance torque is negative; so
-/// the whole circle is searched first, and the arc is what leads up to its summit.
+/// the whole circle is searched first, and the arc is what leads up to its summit, from below nothing there.
 fn rising_arc(
     psi_wb: f64,
     map: &SmoothMap,
@@ -82,15 +82,9 @@ fn rising_arc(
     let Some((top, _)) = inside.max_by(by_torque) else {
         return Vec::new();
     };
-    let mut first = top;
-    while first > 0
-        && scanned[first].torque > 0.0
-        && within(&scanned[first - 1])
-        && scanned[first - 1].torque < scanned[first].torque
-    {
-        first -= 1;
-    }
-    let mut arc = scanned[first..=top].to_vec();
+    let falls = |pair: &&[Point]| within(&pair[0]) && pair[0].torque < pair[1].torque;
+    let steps = scanned[..=top].windows(2).rev().take_while(falls).count();
+    let mut arc = scanned[top - steps..=top].to_vec();
     arc.push(summit(psi_wb, arc[arc.len() - 1], map, optimum, within));
     arc
 }

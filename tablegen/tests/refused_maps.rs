@@ -157,6 +157,11 @@ fn a_node_twice() {
     map.lines.push(line);
     let begin = format!("flux_map.csv:{}: id_a,iq_a: -180,90: duplicate", map.lines.len());
     says(&map.text(), &begin, "must be there once");
+    // There is one zero.
+    let mut map = Map::good();
+    map.lines.push(map.lines[Map::line(7, 0) - 1].replace(",0,", ",-0,"));
+    let begin = format!("flux_map.csv:{}: id_a,iq_a: -180,0: duplicate", map.lines.len());
+    says(&map.text(), &begin, "must be there once");
 }
 
 #[test]
@@ -190,6 +195,8 @@ fn an_uneven_grid() {
         "flux_map.csv:193: iq_a: 91:",
         "must be 100, on an even grid",
     );
+    let text = REFERENCE.map(&[-250.0, -240.0, -230.0, -210.0, -60.0, 50.0], &axis(0.0, 10.0, 26));
+    says(&text, "flux_map.csv:80: id_a: -210:", "must be -220, on an even grid of step 10");
     // A step that no decimal fraction is: rounded to four digits.
     let rounded = |first: f64, count| {
         let exact = axis(first, 250.0 / 27.0, count).into_iter();

@@ -90,6 +90,15 @@ mod tests {
     }
 
     #[test]
+    fn every_number_of_periods_gets_the_shortest_code_that_is_long_enough() {
+        let cycles = |code| DeadTime { divider: 0, code }.cycles();
+        for periods in 0..=LONGEST {
+            let best = (0..=u8::MAX).map(cycles).filter(|time| *time >= periods).min();
+            assert_eq!(Some(cycles(code(periods))), best, "{periods}");
+        }
+    }
+
+    #[test]
     fn every_time_gets_the_shortest_code_that_is_long_enough() {
         for cycles in 1..=DeadTime::LONGEST_CYCLES {
             let found = DeadTime::at_least(cycles).unwrap();

@@ -43,7 +43,9 @@ impl<P: Position> ControlPort for Control<'_, P> {
     fn begin(&mut self, revises: bool) {
         self.timer.acknowledge();
         if revises {
-            revise_pulses();
+            // Between two boundaries, at once; on the host nothing comes.
+            #[cfg(target_os = "none")]
+            super::revise_pulses();
         }
     }
 
@@ -174,12 +176,6 @@ impl PwmPort for Pwm {
     fn is_late(&mut self) -> bool {
         self.registers.legs.software_break() == Some(SoftwareBreak::Late)
     }
-}
-
-/// Makes the PWM interrupt come at once, between two boundaries; on the host nothing does.
-fn revise_pulses() {
-    #[cfg(target_os = "none")]
-    super::revise_pulses();
 }
 
 #[inline]

@@ -9,7 +9,6 @@ use super::temperatures::TemperatureInputs;
 use super::{CLOCK, hardware, pins, switchgear};
 use tractive::drive::OperatorMailboxes;
 use tractive::experiment::{Memory, Teller};
-use tractive::frames::Abc;
 use tractive::operator::{
     Configuration, Feedback, OperatorPort, Request, Settings, Slot, Status, TorqueDemand,
 };
@@ -33,7 +32,8 @@ pub struct Serve<'a, S = CanEndpoint> {
     /// Frames that have come since the last slot, and how many.
     inbox: [Frame; INBOX],
     waiting: usize,
-    temperatures: TemperatureInputs,
+    /// The temperature sensors.
+    pub temperatures: TemperatureInputs,
 }
 
 impl<'a, S> Serve<'a, S> {
@@ -68,9 +68,8 @@ impl<'a, S> Serve<'a, S> {
             position_known: self.position.is_known(),
             // An incremental encoder cannot tell at standstill; while it turns, it looks at its index, and the drive at its angle.
             sensor_alive: !self.position.is_lost(),
-            // The start has refused sensors whose zero is too far off, and taken the rest away.
-            offsets_a: Abc::default(),
             configuration: self.configuration,
+            // No offsets: the start has refused sensors whose zero is too far off, and taken the rest away.
             ..Feedback::default()
         }
     }

@@ -250,6 +250,16 @@ fn a_frame_goes_into_the_free_element_and_is_requested() {
     assert_eq!(bench.can.health().dropped, 0);
 }
 
+/// The index has two bits, the FIFO three elements.
+#[test]
+fn an_index_beyond_the_fifo_is_its_last_element() {
+    let mut bench = Bench::configured();
+    bench.write(TXFQS, 3 << 16);
+    bench.can.send(&Frame { id: 0x181, length: 8, data: [0xAA; 8] });
+    assert_eq!(bench.memory(TX_BUFFERS + 2 * ELEMENT), 0x181 << 18);
+    assert_eq!(bench.read(TXBAR), 1 << 2);
+}
+
 #[test]
 fn what_finds_the_fifo_full_is_dropped_and_counted() {
     let mut bench = Bench::configured();

@@ -192,6 +192,11 @@ fn an_axis_is_even_within_a_thousandth_of_its_step() {
         axes(&nodes, file).is_ok()
     };
     assert!(from(0.0) && from(-1.5) && !from(0.1));
+    // The one to look at is the first that is off by more than that.
+    let id = [-3_000.0, -2_000.0, -999.0, 500.0];
+    let nodes: Vec<_> = (2..).zip(id).map(|(line, id)| node(line, id, 0.0)).collect();
+    let said = axes(&nodes, file).unwrap_err().to_string();
+    assert!(said.contains("csv:5: id_a: 500: must be 0, on an even grid of step 1000"), "{said}");
 }
 
 /// Not even the same flux linkage twice.

@@ -135,8 +135,8 @@ impl Branch {
         let cells: Vec<_> = angles.iter().map(|angle| (angle / width).floor()).collect();
         let bounds: Vec<_> =
             cells.iter().map(|cell| (cell * width + room, (cell + 1.0) * width - room)).collect();
-        // The edge at angle 0 is one, too.
-        let first = cells.first().is_some_and(|cell| *cell > 0.0) || angles[0] >= 2.0 * room;
+        // The edge at angle 0 is one, too; beyond its own half every edge is far enough from it.
+        let first = angles[0] >= 2.0 * room;
         let single = cells.windows(2).all(|pair| pair[0] < pair[1]);
         (first && single).then_some(bounds)
     }

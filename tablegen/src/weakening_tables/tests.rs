@@ -1,7 +1,8 @@
 //! Circles of a machine without saturation by closed forms, what is read of them by hand, and lines beside them by brute force.
 
 use super::*;
-use crate::testing::{IPM, MOST_A, POLE_PAIRS, RESISTANCE_OHM, near};
+use crate::FluxMap;
+use crate::testing::{IPM, Linear, MOST_A, POLE_PAIRS, RESISTANCE_OHM, near};
 
 const FACTOR: f64 = 1.5 * POLE_PAIRS as f64;
 /// Full torque's flux linkage, made up.
@@ -206,19 +207,95 @@ fn rows_of_a_linear_machine() {
     assert!(on > 5, "{on}");
 }
 
-/// To the same torque on another circle, exactly; or not at all.
+/// The same machine with another map.
+fn with_map(map: Linear) -> MachineFolder {
+    let mut machine = IPM.folder(&[]);
+    let FluxMap { id_a, iq_a, psi_d_wb, psi_q_wb } = &mut machine.map;
+    let nodes = id_a.iter().flat_map(|id| iq_a.iter().map(|iq| map.flux_wb(*id, *iq)));
+    (*psi_d_wb, *psi_q_wb) = nodes.unzip();
+    machine
+}
+
+/// Its q axis saturates: at the largest current by 30 %.
+fn saturated(mut machine: MachineFolder) -> MachineFolder {
+    let FluxMap { iq_a, psi_q_wb, .. } = &mut machine.map;
+    let share = |iq: &f64| 1.0 - 0.3 * (iq / MOST_A).powi(2);
+    psi_q_wb.iter_mut().zip(iq_a.iter().cycle()).for_each(|(psi, iq)| *psi *= share(iq));
+    machine
+}
+
+/// A machine that is not done with being made narrower once.
+#[test]
+fn circles_are_made_anew_until_nothing_exceeds() {
+    let mut machine = with_map(Linear { ld_h: 0.002, lq_h: 0.03, psi_m_wb: 0.02 });
+    machine.parameters.dc_link_min_v = 30.0;
+    let smooth = SmoothMap::new(&machine.map);
+    let mut circles = Circles::new(&machine, &smooth, 0.1);
+    let rounds = (0..ROUNDS).take_while(|_| circles.narrow()).count();
+    assert!((2..ROUNDS).contains(&rounds), "{rounds}");
+    let mtpa = MtpaCurrents { last_torque_nm: 60.0, currents_a: vec![(0.0, 0.0), (-5.0, 15.0)] };
+    let tables = weakening_tables(&machine, &smooth, 0.1, &mtpa);
+    let nodes = circles.rows.iter().flat_map(|row| &row.nodes);
+    let wanted: Vec<_> = nodes.map(|(id, effective)| [*id as f32, *effective as f32]).collect();
+    assert_eq!(tables.currents.nodes, wanted);
+}
+
+/// A machine whose d axis has the larger inductance, beyond what takes its magnets' flux: its torque would be divided by nothing, or by less.
+#[test]
+fn what_torque_is_divided_by_is_above_zero() {
+    let machine = with_map(Linear { ld_h: 0.015, lq_h: 0.006, psi_m_wb: 0.1 });
+    let smooth = SmoothMap::new(&machine.map);
+    let circles = Circles::new(&machine, &smooth, 0.8);
+    let effective = circles.rows.iter().flat_map(|row| &row.nodes).map(|node| node.1);
+    let least = effective.fold(f64::INFINITY, f64::min);
+    near(least, 1e-6 * circles.flux_wb(1.0), 1e-12);
+}
+
+/// A machine of a five-thousandth of the current, which saturates as the larger one does, has the same circles.
+#[test]
+fn the_machines_size_does_not_matter() {
+    let row = |size: f64| {
+        let mut machine = saturated(IPM.folder(&[]));
+        machine.map.id_a.iter_mut().chain(&mut machine.map.iq_a).for_each(|current| *current *= size);
+        machine.parameters.max_current_a *= size;
+        let smooth = SmoothMap::new(&machine.map);
+        let row = Circles::new(&machine, &smooth, TOP_WB).rows.swap_remove(60);
+        row.nodes
+            .into_iter()
+            .map(|(id, effective)| (id / size, effective, row.torque_nm / size))
+            .collect::<Vec<_>>()
+    };
+    for (large, small) in row(1.0).into_iter().zip(row(0.000_2)) {
+        near(small.0, large.0, 1e-6);
+        near(small.1, large.1, 1e-6);
+        near(small.2, large.2, 1e-6);
+    }
+}
+
+/// To the same torque on another circle, exactly; or not at all; whatever the machine's size.
 #[test]
 fn currents_are_moved_along_their_torque() {
-    let (mut machine, smooth) = machine();
+    for size in [1.0, 1e-5] {
+        moved_along_their_torque(size);
+    }
+}
+
+/// With so many times the flux linkage.
+fn moved_along_their_torque(size: f64) {
+    let Linear { ld_h, lq_h, psi_m_wb } = IPM;
+    let own = Linear { ld_h: size * ld_h, lq_h: size * lq_h, psi_m_wb: size * psi_m_wb };
+    let mut machine = with_map(own);
+    machine.parameters.max_torque_nm *= size;
     machine.parameters.min_id_a = -12.0;
+    let smooth = SmoothMap::new(&machine.map);
     let circles = made_up(&machine, &smooth);
     for (id, iq) in [(-11.0, 6.0), (-6.0, 10.0), (-2.0, 3.0), (-9.0, 0.5)] {
-        let (psi_d, psi_q) = IPM.flux_wb(id, iq);
-        let (from_wb, torque_nm) = (psi_d.hypot(psi_q), IPM.torque_nm(id, iq));
+        let (psi_d, psi_q) = own.flux_wb(id, iq);
+        let (from_wb, torque_nm) = (psi_d.hypot(psi_q), own.torque_nm(id, iq));
         for share in [1.0, 0.98, 1.02, 0.999_9] {
             let (moved_d, moved_q) = circles.moved((id, iq), torque_nm, from_wb, share * from_wb);
-            near(IPM.torque_nm(moved_d, moved_q), torque_nm, 1e-8);
-            let (psi_d, psi_q) = IPM.flux_wb(moved_d, moved_q);
+            near(own.torque_nm(moved_d, moved_q), torque_nm, 1e-8);
+            let (psi_d, psi_q) = own.flux_wb(moved_d, moved_q);
             near(psi_d.hypot(psi_q), share * from_wb, 1e-11);
         }
         assert_eq!(circles.moved((id, iq), torque_nm, from_wb, from_wb), (id, iq));
@@ -228,9 +305,9 @@ fn currents_are_moved_along_their_torque() {
         }
         // On the circle itself already, but of another torque.
         let (moved_d, moved_q) = circles.moved((id, iq), 1.01 * torque_nm, from_wb, from_wb * (1.0 + 1e-14));
-        near(IPM.torque_nm(moved_d, moved_q), 1.01 * torque_nm, 1e-8);
+        near(own.torque_nm(moved_d, moved_q), 1.01 * torque_nm, 1e-8);
         // No current has that torque there.
-        assert_eq!(circles.moved((id, iq), torque_nm, from_wb, 1e-4), (id, iq));
+        assert_eq!(circles.moved((id, iq), torque_nm, from_wb, 1e-4 * size), (id, iq));
         // Below the least i_d, or beyond the map.
         for share in [0.5, 1.7] {
             let (moved_d, _) = circles.moved((id, iq), torque_nm, from_wb, share * from_wb);

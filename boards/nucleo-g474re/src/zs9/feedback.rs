@@ -57,24 +57,23 @@ impl Feedback {
     /// The words that [`Self::begin`] asked for.
     #[inline]
     pub fn end(&self) -> GateFeedback {
-        let words = (self.word(), self.word());
+        let words = [self.word(), self.word()];
         self.port.bsrr().write(|w| w.set_bs(SELECT, true));
-        match words {
-            (Some(on), Some(off)) => decoded([on, off]),
-            _ => GateFeedback::default(),
-        }
+        decoded(words)
     }
 
+    /// The next word; `None` if it does not come.
     #[inline]
-    fn word(&self) -> Option<u16> {
+    pub fn word(&self) -> Option<u16> {
         let arrived = (0..PATIENCE).any(|_| self.spi.sr().read().rxne());
         arrived.then(|| self.spi.dr16().read())
     }
 }
 
-/// The feedback of two words; nothing seen if one of them has no mark.
+/// The feedback of two words; nothing seen if one of them is missing or has no mark.
 #[inline]
-pub fn decoded([on, off]: [u16; 2]) -> GateFeedback {
+pub fn decoded(words: [Option<u16>; 2]) -> GateFeedback {
+    let [Some(on), Some(off)] = words else { return GateFeedback::default() };
     if on & !GATES == FIRST_MARK && off & !GATES == SECOND_MARK {
         GateFeedback { on: on & GATES, off: off & GATES }
     } else {

@@ -10,6 +10,7 @@ mod outputs;
 mod pins;
 mod ports;
 mod position;
+mod sampling;
 mod start;
 mod temperatures;
 mod zs9;

@@ -2,20 +2,23 @@
 
 use crate::bench::Bench;
 use crate::plan;
+use crate::temperatures::done;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::can::Can;
 use nucleo_g474re::pins::{Function, PINS};
-use nucleo_g474re::position::PositionState;
-use nucleo_g474re::power_stage::AdcCode;
+use nucleo_g474re::position::{Encoder, PositionState};
+use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use nucleo_g474re::registers::Registers;
-use nucleo_g474re::serve::Serve;
-use nucleo_g474re::{Pwm, hardware, switchgear};
+use nucleo_g474re::serve::{Identifying, Serve, Station};
+use nucleo_g474re::{Control, Pwm, hardware, switchgear};
 use stm32_metapac::gpio::{self, regs::Idr};
+use tractive::experiment::Memory;
 use tractive::modulation::{CarrierHalf, Mode};
-use tractive::operator::{Configuration, Feedback, Switches};
-use tractive::ports::PwmPort;
+use tractive::operator::{Configuration, Feedback, State, Status, Switches};
+use tractive::ports::{ControlPort, PwmPort};
 use tractive::protection::{Fault, SafeState};
-use tractive::protocol::CanEndpoint;
+use tractive::protocol::{CanEndpoint, EXPERIMENT};
+use tractive::thermal::Ratios;
 use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);
@@ -26,8 +29,13 @@ fn write_input(port: gpio::Gpio, levels: u32) {
 }
 
 fn drivers_ready(registers: &Registers, ready: bool) {
-    write_input(registers.gpiob, u32::from(ready) << 12);
-    write_input(registers.gpioa, u32::from(ready) << 6);
+    ready_at(registers, [ready; 2]);
+}
+
+/// The level at either break input.
+fn ready_at(registers: &Registers, [b, a]: [bool; 2]) {
+    write_input(registers.gpiob, u32::from(b) << 12);
+    write_input(registers.gpioa, u32::from(a) << 6);
 }
 
 /// The last write to a set-and-reset register, as (set, reset); the memory is emptied.
@@ -103,9 +111,61 @@ fn the_operator_hears_of_contacts_drivers_and_inputs() {
         write_input(registers.gpioc, levels);
         assert_eq!(serve.feedback(), wanted, "{levels:#b}");
     }
-    drivers_ready(&registers, false);
-    let feedback = serve.feedback();
-    assert_eq!((feedback.driver_ready, feedback.hardware), (false, Some(Fault::GateDriver)));
+    for inputs in [[false; 2], [true, false], [false, true]] {
+        ready_at(&registers, inputs);
+        let feedback = serve.feedback();
+        assert_eq!((feedback.driver_ready, feedback.hardware), (false, Some(Fault::GateDriver)));
+    }
+}
+
+/// An angle that is not known and that the drive can find, and the voltages of the temperature sensors.
+#[test]
+fn the_operator_hears_of_a_count_and_of_the_temperature_sensors() {
+    let registers = Bench::started(plan()).registers;
+    let state = PositionState::new();
+    let station = CanEndpoint::new(&BUILT_IN.ratings);
+    let mut serve = Serve::new(registers, Can::CHIP, station, &state, Configuration::Good);
+    assert!(!serve.feedback().position_counted);
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    Control::new(registers, [AdcCode(2_048); 3], encoder, &state).sample(NOW);
+    assert!(serve.feedback().position_counted);
+    for code in [1_000, 1_001, 1_002] {
+        serve.temperatures.step(registers.adc1);
+        done(registers.adc1, code);
+    }
+    assert_eq!(serve.feedback().temperatures, Ratios { winding: 1_000 << 4, heat_sink: 1_001 << 4 });
+}
+
+/// The drive's frames as they are without an identification, and its own in the slots between.
+#[test]
+fn an_identification_tells_of_itself_where_the_drives_frames_leave_room() {
+    let memory = Memory::new();
+    let mut alone = CanEndpoint::new(&BUILT_IN.ratings);
+    let mut station = Identifying::new(CanEndpoint::new(&BUILT_IN.ratings), &memory);
+    let status = Status {
+        state: State::SelfTest,
+        trip: None,
+        refusal: None,
+        refusals: 0,
+        torque_nm: 0.0,
+        switches: Switches::default(),
+        temperatures: None,
+    };
+    let (mut of_drive, mut own) = (0, 0);
+    for _ in 0..1_000 {
+        match (alone.tell(&status, None), station.tell(&status, None)) {
+            (Some(wanted), told) => {
+                assert_eq!(told, Some(wanted));
+                of_drive += 1;
+            }
+            (None, Some(told)) => {
+                assert_eq!(told.id, EXPERIMENT.id);
+                own += 1;
+            }
+            (None, None) => {}
+        }
+    }
+    assert!(of_drive > 100 && own > 10, "{of_drive} {own}");
 }
 
 #[test]
@@ -166,6 +226,19 @@ fn a_safe_state_is_left_with_the_gates_off_and_pulses_follow() {
         assert!(pulses(&mut bench, &mut pwm), "after");
         assert!(bench.legs.iter().all(|leg| leg.gates().0), "and the legs follow again");
     }
+}
+
+/// The interrupt of a boundary that comes meanwhile is not lost.
+#[test]
+fn a_break_is_forgotten_and_a_boundary_is_not() {
+    let mut bench = Bench::started(plan());
+    let legs = bench.registers.legs;
+    legs.trip();
+    while !bench.tick() {}
+    assert!(legs.is_tripped() && legs.has_updated());
+    assert!(legs.leave());
+    bench.settle();
+    assert!(!legs.is_tripped() && legs.has_updated());
 }
 
 #[test]

@@ -145,6 +145,25 @@ fn the_documentation_has_the_table_that_the_code_has() {
     }
 }
 
+/// The level that a pin is given before it is an output.
+#[test]
+fn an_output_is_high_at_first_and_a_switch_low() {
+    use nucleo_g474re::pins::configure_inputs;
+    for pin in every_pin() {
+        let registers = Bench::new().registers;
+        configure_inputs(&registers, &[*pin]);
+        let (high, low) = (1 << pin.number, 1 << (16 + pin.number));
+        let wanted = match pin.function {
+            Function::Output => high,
+            Function::Switch => low,
+            _ => 0,
+        };
+        // SAFETY: BSRR is word 6 of the port's block of memory.
+        let written = unsafe { pin.port.of(&registers).as_ptr().cast::<u32>().add(6).read() };
+        assert_eq!(written, wanted, "{}", name(pin));
+    }
+}
+
 /// A kind's configuration, and which pins are of it.
 type Kind = (fn(&Registers, &[Pin]), fn(&Pin) -> bool);
 

@@ -11,6 +11,7 @@ use nucleo_g474re::start::{self, Wait};
 use nucleo_g474re::watchdog::Pulse;
 use nucleo_g474re::{Control, Pwm};
 use stm32_metapac::gpio::regs::Idr;
+use stm32_metapac::timer::regs::SrGp16;
 use tractive::frames::Angle;
 use tractive::ports::{ControlPort, PwmPort};
 use tractive::protection::{Fault, SafeState};
@@ -189,6 +190,47 @@ fn a_converter_that_is_silent_gives_no_number() {
     assert!(currents.a.is_nan() && currents.b.is_nan() && currents.c.is_nan());
 }
 
+/// Flags are cleared by writing 0 and left alone by writing 1.
+#[test]
+fn the_control_interrupt_is_acknowledged_and_no_other_flag() {
+    let registers = Bench::started(plan()).registers;
+    let state = PositionState::new();
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    registers.tim3.sr().write_value(SrGp16(0));
+    Control::new(registers, ZEROS, encoder, &state).begin(false);
+    assert_eq!(registers.tim3.sr().read().0, !1);
+}
+
+/// What the drive finds the angle by.
+#[test]
+fn the_drive_is_told_what_is_counted_and_tells_where_the_count_began() {
+    let registers = Bench::started(plan()).registers;
+    let state = PositionState::new();
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let mut control = Control::new(registers, ZEROS, encoder, &state);
+    registers.tim4.cnt().write(|w| w.set_cnt(110));
+    control_update(&registers);
+    let counted = Angle(110 << 22);
+    assert_eq!((control.sample(NOW).angle, control.turned()), (None, Some(counted)));
+    assert!(state.is_counted() && !state.is_known());
+    control.align(NOW, Angle::DEG_90);
+    assert_eq!((control.sample(NOW).angle, control.turned()), (Some(Angle::DEG_90 + counted), None));
+    assert!(state.is_known() && !state.is_counted());
+}
+
+/// The same interrupt comes at boundaries, which it acknowledges, and in between for a revision.
+#[test]
+fn a_boundary_is_told_from_a_revision_and_acknowledged() {
+    let mut bench = Bench::started(plan());
+    let mut pwm = Pwm::new(bench.registers, ZEROS);
+    for _ in 0..3 {
+        assert!(!pwm.is_boundary() && !pwm.begin());
+        while !bench.tick() {}
+        assert!(pwm.is_boundary() && pwm.begin());
+        bench.settle();
+    }
+}
+
 #[test]
 fn an_overrun_is_counted_from_the_next_period() {
     let bench = Bench::started(plan());
@@ -257,6 +299,7 @@ fn an_index_must_find_the_count_where_it_is_expected() {
         (-41, -40, true),
         (41, -2_000, true),
         (3, 9, true),
+        (20, 12, true),
     ] {
         let registers = Bench::started(plan()).registers;
         let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);

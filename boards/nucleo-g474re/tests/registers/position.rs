@@ -9,7 +9,7 @@ use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use nucleo_g474re::registers::Registers;
 use stm32_metapac::adc::Adc;
 use stm32_metapac::spi::vals::{Br, Cpha, Cpol};
-use stm32_metapac::timer::vals::Ocm;
+use stm32_metapac::timer::vals::{Ocm, Sms};
 use tractive::frames::Angle;
 use tractive::ports::ControlPort;
 use tractive::time::Instant;
@@ -62,6 +62,15 @@ fn an_absolute_angle_is_that_of_the_frame_before() {
         receive(&registers, 0b1001_0110_0110_1000, true);
         assert!(sensor.angle().is_some());
     }
+}
+
+/// From 0 to one less than there are in a turn, at every edge of both tracks; the index sets it to 0.
+#[test]
+fn an_encoders_timer_counts_a_turn() {
+    let timer = Bench::started(plan()).registers.tim4;
+    assert_eq!(u32::from(timer.arr().read().arr()) + 1, POWER_STAGE.encoder_counts);
+    assert_eq!(timer.smcr().read().sms(), Sms::ENCODER_MODE_3);
+    assert!(timer.ecr().read().ie() && timer.cr1().read().cen());
 }
 
 #[test]
@@ -159,6 +168,7 @@ fn control_is_told_of_a_lost_excitation() {
             bench.finish_sequence(registers.adc1);
             let angle = control.sample(Instant(0)).angle;
             assert!(positive || (angle.is_some(), state.is_known()) == (known, known), "{windings:?}");
+            assert!(control.turned().is_none() && !state.is_counted(), "it counts nothing");
         }
     }
 }

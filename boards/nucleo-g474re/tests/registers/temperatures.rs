@@ -9,7 +9,7 @@ use stm32_metapac::adc::{Adc, regs};
 use tractive::thermal::Ratios;
 
 /// A conversion that is done, with its result.
-fn done(adc: Adc, code: u16) {
+pub fn done(adc: Adc, code: u16) {
     adc.cr().modify(|w| w.set_adstart(false));
     let mut flags = regs::Isr(0);
     flags.set_eoc(true);

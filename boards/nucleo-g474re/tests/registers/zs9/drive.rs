@@ -20,7 +20,7 @@ struct Port<'a> {
 
 impl PwmPort<Dual> for Port<'_> {
     fn sample(&mut self, now: Instant) -> PowerSample {
-        assert_eq!(nucleo_g474re::zs9::feedback::decoded(encoded(self.seen)), self.seen);
+        assert_eq!(nucleo_g474re::zs9::feedback::decoded(encoded(self.seen).map(Some)), self.seen);
         PowerSample { gates: self.seen, ..self.pwm.sample(now) }
     }
 

@@ -2,19 +2,25 @@
 
 use super::model::Model;
 use super::ports::{control, converted, drivers_ready, make_ready, zeros};
+use crate::bench::Bench;
+use crate::bus::Bus;
+use nucleo_g474re::built_in::zs9::BUILT_IN;
 use nucleo_g474re::can::Can;
 use nucleo_g474re::outputs::SoftwareBreak;
 use nucleo_g474re::position::PositionState;
 use nucleo_g474re::registers::Registers;
+use nucleo_g474re::start::StartError;
 use nucleo_g474re::switchgear;
 use nucleo_g474re::zs9::hardware::{held_by, latched_by};
 use nucleo_g474re::zs9::serve::DualServe;
-use nucleo_g474re::zs9::{self, Pwm, RATINGS, start};
+use nucleo_g474re::zs9::{self, CLOCK, Pwm, RATINGS, settings, start};
 use stm32_metapac::gpio::regs::Idr;
-use tractive::operator::{Configuration, Feedback, Switches};
+use tractive::drive::dual::{ControlTask, Shared};
+use tractive::nine_switch::Scheme;
+use tractive::operator::{Configuration, DualSlot, Feedback, Line, Settings, State, Switches, slot_s};
 use tractive::ports::{ControlPort, HardwareBreak, PwmPort};
 use tractive::protection::Fault;
-use tractive::protocol::Zs9CanEndpoint;
+use tractive::protocol::{Payload, StatusFrame, TO_ZS9, ZS9_STATUS, Zs9CanEndpoint};
 use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);
@@ -133,6 +139,71 @@ fn the_operator_hears_of_contacts_drivers_and_inputs() {
     drivers_ready(&registers, false);
     let feedback = serve.feedback();
     assert_eq!((feedback.driver_ready, feedback.hardware), (false, Some(Fault::GateDriver)));
+}
+
+/// The operator's side of the board in memory, with its bus.
+struct Idle {
+    registers: Registers,
+    bus: Bus,
+    serve: DualServe<'static>,
+    slot: DualSlot,
+    rated: Settings<'static>,
+}
+
+impl Idle {
+    fn new() -> Self {
+        let registers = Model::started().registers;
+        let bus = Bus::new(&TO_ZS9, &registers, &mut Bench::of_other_inverter());
+        let state: &'static PositionState = Box::leak(Box::new(PositionState::new()));
+        let station = Zs9CanEndpoint::new(&RATINGS);
+        let serve = DualServe::new(registers, bus.can, station, state, Configuration::Good);
+        let line = Line::rated(&RATINGS, 0.1, 0.1).without_chopper();
+        let rated = Settings::rated(&RATINGS, slot_s(&CLOCK), Some(line));
+        Self { registers, bus, serve, slot: DualSlot::new(), rated }
+    }
+
+    /// The status on the bus, if one was sent.
+    fn heard(&mut self) -> Option<StatusFrame<Scheme>> {
+        let frame = self.bus.settle().filter(|frame| frame.id == ZS9_STATUS.id)?;
+        Some(StatusFrame::decode(Payload(u64::from_le_bytes(frame.data))))
+    }
+}
+
+/// Ten periods to a slot, ten slots to a status.
+#[test]
+fn each_slot_is_done_once_and_its_status_is_sent_and_its_switches_are_set() {
+    let mut idle = Idle::new();
+    let shared = Shared::new();
+    assert!(!idle.serve.pass(&mut idle.slot, &shared.operator, &idle.rated), "nothing is observed yet");
+    let state = PositionState::new();
+    let mut control = control(idle.registers, &state);
+    let mut task = ControlTask::new(&BUILT_IN, settings());
+    let (mut slots, mut told) = (0, Vec::new());
+    for _ in 0..1_000 {
+        converted(&[], idle.registers);
+        task.run(&mut control, &shared);
+        slots += u32::from(idle.serve.pass(&mut idle.slot, &shared.operator, &idle.rated));
+        assert!(!idle.serve.pass(&mut idle.slot, &shared.operator, &idle.rated), "once");
+        told.extend(idle.heard());
+    }
+    assert_eq!((slots, told.len()), (100, 10));
+    assert_eq!(told[0].state, Some(State::SelfTest));
+    // SAFETY: BSRR is word 6 of the port's block of memory.
+    let written = unsafe { idle.registers.gpioc.as_ptr().cast::<u32>().add(6).read() };
+    assert_eq!(written, 1 << 25, "the discharge resistor is off");
+}
+
+#[test]
+fn a_start_that_is_refused_is_told_on_the_bus() {
+    let mut idle = Idle::new();
+    let why = StartError::WatchdogReset.failed();
+    let mut told = Vec::new();
+    for _ in 0..100 {
+        idle.serve.refuse(&mut idle.slot, why, &idle.rated);
+        told.extend(idle.heard());
+    }
+    let faults = told.iter().map(|status| (status.state, Fault::from_code(status.fault.into())));
+    assert_eq!(faults.collect::<Vec<_>>(), [(Some(State::Fault), Some(Fault::StartRefused)); 10]);
 }
 
 #[test]

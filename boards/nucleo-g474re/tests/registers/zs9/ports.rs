@@ -2,19 +2,24 @@
 
 use super::model::Model;
 use crate::bench::{Bench, control_update};
+use nucleo_g474re::outputs::SoftwareBreak;
 use nucleo_g474re::position::{Encoder, PositionState};
 use nucleo_g474re::power_stage::AdcCode;
 use nucleo_g474re::registers::Registers;
+use nucleo_g474re::start::Wait;
 use nucleo_g474re::zs9::sampling::Zeros;
 use nucleo_g474re::zs9::stage::STAGE;
 use nucleo_g474re::zs9::{CLOCK, Control, Pwm, start};
 use stm32_metapac::adc::regs::Isr;
 use stm32_metapac::gpio::regs::Idr;
+use stm32_metapac::spi::vals::{Br, Ds, Mstr};
+use stm32_metapac::timer::regs::SrGp16;
 use stm32_metapac::timer::vals::Dir;
 use tractive::control::Demand;
-use tractive::frames::Angle;
+use tractive::frames::{Abc, Angle};
 use tractive::ports::DualDriveCommand;
 use tractive::ports::{ControlPort, GateFeedback, MotorDemand, PwmPort};
+use tractive::protection::SafeState;
 use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);
@@ -205,15 +210,75 @@ fn the_driver_boards_latches_are_two_marked_words() {
 }
 
 #[test]
-fn two_marked_words_are_what_the_gates_did() {
+fn two_words_are_what_the_gates_did_and_one_is_nothing() {
     use nucleo_g474re::zs9::feedback::decoded;
     let (on, off) = (0x1A5, 0x05A);
-    let words = [0b1010101 << 9 | on, 0b0101010 << 9 | off];
-    assert_eq!(decoded(words), GateFeedback { on, off });
-    for bit in 9..16 {
-        assert_eq!(decoded([words[0] ^ 1 << bit, words[1]]), GateFeedback::default());
-        assert_eq!(decoded([words[0], words[1] ^ 1 << bit]), GateFeedback::default());
+    let [first, second] = [0b1010101 << 9 | on, 0b0101010 << 9 | off].map(Some);
+    assert_eq!(decoded([first, second]), GateFeedback { on, off });
+    for words in [[first, None], [None, second], [None; 2]] {
+        assert_eq!(decoded(words), GateFeedback::default());
     }
+}
+
+/// Master, 16 bits, at an eighth of 170 MHz, with a select line of its own.
+#[test]
+fn the_driver_board_is_asked_for_two_words_while_it_is_selected() {
+    let registers = Model::started().registers;
+    let (settings, feedback) = (registers.spi3.cr1().read(), start::feedback(&registers));
+    assert_eq!(registers.spi3.cr2().read().ds(), Ds::BITS16);
+    assert_eq!((settings.mstr(), settings.br()), (Mstr::MASTER, Br::DIV8));
+    assert!(settings.ssm() && settings.ssi() && settings.spe());
+    // SAFETY: BSRR is word 6 of the port's block of memory.
+    let written = || unsafe { registers.gpioa.as_ptr().cast::<u32>().add(6).replace(0) };
+    written();
+    registers.spi3.dr16().write_value(0x1234);
+    feedback.begin();
+    assert_eq!((written(), registers.spi3.dr16().read()), (1 << 31, 0), "low, and words under way");
+    registers.spi3.dr16().write_value(0x1234);
+    registers.spi3.sr().write(|w| w.set_rxne(true));
+    assert_eq!(feedback.word(), Some(0x1234));
+    feedback.end();
+    assert_eq!(written(), 1 << 15, "high again");
+    registers.spi3.sr().write(|w| w.set_rxne(false));
+    assert_eq!(feedback.word(), None);
+}
+
+#[test]
+fn the_first_samples_are_right_however_long_the_start_takes() {
+    let mut bench = Bench::of_other_inverter();
+    let registers = bench.registers;
+    start::prepare(&registers, &mut bench).unwrap();
+    bench.microseconds(50_000);
+    start::run(&registers, &mut bench);
+    bench.microseconds(100);
+    for adc in [registers.adc1, registers.adc2, registers.adc3] {
+        bench.finish_sequence(adc);
+    }
+    let state = PositionState::new();
+    let sample = control(registers, &state).sample(NOW);
+    assert_eq!(sample.currents_a, [Abc::default(); 2]);
+    assert_eq!(sample.inductor_a, 0.0);
+}
+
+/// Flags are cleared by writing 0 and left alone by writing 1.
+#[test]
+fn the_control_interrupt_is_acknowledged_and_no_other_flag() {
+    let registers = Model::started().registers;
+    let state = PositionState::new();
+    registers.tim2.sr().write_value(SrGp16(0));
+    control(registers, &state).begin(false);
+    assert_eq!(registers.tim2.sr().read().0, !1);
+}
+
+#[test]
+fn a_fault_that_control_names_turns_the_gates_off() {
+    let mut model = Model::started();
+    let state = PositionState::new();
+    control(model.registers, &state).enter(SafeState::GatesOff, NOW);
+    model.settle();
+    let outputs = start::bridge(&model.registers).outputs();
+    assert!(outputs.is_tripped());
+    assert_eq!(outputs.software_break(), Some(SoftwareBreak::Drive));
 }
 
 #[test]
