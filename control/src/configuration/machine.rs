@@ -38,6 +38,8 @@ impl Ratings {
             trip_dc_under_v,
             trip_speed_rad_s,
             torque_slew_nm_s,
+            iron,
+            iron_share,
         } = *self;
         checked!(within(&[
             Bound("ratings.pole_pairs", pole_pairs, 1.0, 100.0),
@@ -57,6 +59,9 @@ impl Ratings {
             Bound("ratings.trip_dc_under_v", trip_dc_under_v, 0.0, 1e6),
             Bound("ratings.trip_speed_rad_s", trip_speed_rad_s, ABOVE_ZERO, 1.1e6),
             Bound("ratings.torque_slew_nm_s", torque_slew_nm_s, ABOVE_ZERO, 1e9),
+            Bound("ratings.iron.hysteresis", iron.hysteresis, 0.0, 1e9),
+            Bound("ratings.iron.eddy", iron.eddy, 0.0, 1e9),
+            Bound("ratings.iron_share", iron_share, 0.0, 1.0),
         ]));
         self.check_together()
     }
