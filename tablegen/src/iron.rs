@@ -80,3 +80,26 @@ fn rated_square(parameters: &Parameters, map: &SmoothMap) -> f64 {
     let at = map.at(id_a, iq_a);
     at.psi_d_wb * at.psi_d_wb + at.psi_q_wb * at.psi_q_wb
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MachineFolder;
+    use tractive_control::frames::Dq;
+
+    #[test]
+    fn a_drive_knows_the_same_torque() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tables/pmasynrm-180kw");
+        let machine = MachineFolder::read(std::path::Path::new(folder)).unwrap();
+        let iron = Iron::of(&machine.parameters, &machine.map, 1.0);
+        let known = iron.known();
+        assert_eq!(machine.tables().ratings.iron, known);
+        for (d, q, omega) in [(0.4, -1.2, 838.0), (0.9, 0.3, -1_500.0), (1.0, 0.2, 0.8), (0.7, 0.0, 0.0)] {
+            let exact = iron.torque_nm(f64::from(d * d + q * q), f64::from(omega));
+            let told = known.torque_nm(Dq { d, q }, omega);
+            assert!((f64::from(told) - exact).abs() <= 1e-5 * exact.abs(), "{told} N·m, {exact} N·m");
+            assert!(exact.abs() > 1.0 || omega == 0.0, "{exact} N·m");
+        }
+        assert_eq!(Iron::of(&machine.parameters, &machine.map, 0.0).known(), IronLoss::NONE);
+    }
+}

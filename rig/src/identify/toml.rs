@@ -37,6 +37,7 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
         ("rotor_inertia_kg_m2", inertia, "identified"),
         ("loss_rated_w", given.loss_rated_w, "given"),
         ("loss_quadratic_fraction", given.loss_quadratic_fraction, "given"),
+        ("iron_loss_share", given.iron_loss_share, "given"),
     ];
     toml(&given.name, "identify", &keys)
 }
