@@ -64,6 +64,8 @@ pub struct Setup {
     pub threshold_mv: u32,
     /// Their slope, in hundredths of a mΩ, below 2¹⁴.
     pub slope_10uohm: u32,
+    /// The share of the machine's iron loss that the drive makes up for, in thousandths.
+    pub iron_permille: u32,
     /// The operator's limits of line and acceleration; over the protocol the parameters hold.
     pub train: TrainLimits,
 }
@@ -184,6 +186,11 @@ impl Request {
 }
 
 impl Setup {
+    /// The share of the machine's iron loss that the drive makes up for.
+    pub fn iron_share(&self) -> f32 {
+        1e-3 * self.iron_permille as f32
+    }
+
     /// The devices' drops that the drive knows of.
     pub fn drops(&self) -> Drops {
         Drops { threshold_v: 1e-3 * self.threshold_mv as f32, slope_ohm: 1e-5 * self.slope_10uohm as f32 }
@@ -200,7 +207,8 @@ pub fn setup_to_block(setup: Setup) -> Block {
         | setup.threshold_mv << 3
         | setup.slope_10uohm << 18;
     let more = [flags, setup.control_ticks, setup.angle_late_s.to_bits(), setup.angle_step_rad.to_bits()];
-    let line = line_to_words(setup.line);
+    let mut line = line_to_words(setup.line);
+    line[0] |= setup.iron_permille << 1;
     filled(ticks.into_iter().chain(line).chain(more).chain(setup.train.to_words()))
 }
 
@@ -224,7 +232,7 @@ fn line_to_words(line: Option<LineTimes>) -> [u32; 3] {
 
 fn line_from_words([present, precharge, discharge]: [u32; 3]) -> Option<LineTimes> {
     let times = LineTimes { precharge_s: f32::from_bits(precharge), discharge_s: f32::from_bits(discharge) };
-    (present == 1).then_some(times)
+    (present & 1 == 1).then_some(times)
 }
 
 /// A status and a frame, one after the other.
@@ -259,6 +267,7 @@ pub fn setup_from_block(block: &Block) -> Setup {
         current_filter_ticks: times >> 16,
         threshold_mv: flags >> 3 & 0x7fff,
         slope_10uohm: flags >> 18,
+        iron_permille: operated >> 1,
         over_protocol: flags & 1 != 0,
         uncompensated: flags & 2 != 0,
         behind_line_filter: flags & 4 != 0,

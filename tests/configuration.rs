@@ -5,7 +5,7 @@ use tractive::built_in::{traction::BUILT_IN, zs9};
 use tractive::configuration::Refused;
 use tractive::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
 use tractive::drive::{dual, traction};
-use tractive::machine::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
+use tractive::machine::{Curve, Grid, IronLoss, Mtpa, Ratings, Tables, Weakening};
 use tractive::modulation::SwitchLimits;
 use tractive::protection::LinkLimits;
 use tractive::time::Clock;
@@ -61,11 +61,13 @@ macro_rules! whole_scalars {
 whole_scalars!(u32, usize);
 
 /// Scalars for which 0 is a value like any other: what is ideal, what is not there, where an axis begins.
-const MAY_BE_ZERO: [&str; 9] = [
+const MAY_BE_ZERO: [&str; 11] = [
     "ratings.min_id_a",
     "ratings.stator_resistance_ohm",
     "ratings.magnet_flux_wb",
     "ratings.trip_dc_under_v",
+    "ratings.iron.hysteresis",
+    "ratings.iron.eddy",
     "devices.min_pulse_ticks",
     "devices.dead_time_ticks",
     "link.resistance_ohm",
@@ -102,9 +104,11 @@ fn try_tables(good: &'static Tables, check: impl Fn(&Tables) -> Result<(), Refus
     let ratings = fields!(Ratings as Ratings {
         pole_pairs, stator_resistance_ohm, max_torque_nm, max_power_w, max_current_a, min_id_a, max_speed_rad_s, magnet_flux_wb,
         dc_link_min_v, dc_link_nominal_v, dc_link_max_v, max_switching_hz, trip_current_a, trip_dc_over_v,
-        trip_dc_under_v, trip_speed_rad_s, torque_slew_nm_s |
+        trip_dc_under_v, trip_speed_rad_s, torque_slew_nm_s, iron_share | iron
     }: f32);
     try_all(*good, "ratings.", ratings, |tables| &mut tables.ratings, check);
+    let iron = fields!(IronLoss as IronLoss { hysteresis, eddy | }: f32);
+    try_all(*good, "ratings.iron.", iron, |tables| &mut tables.ratings.iron, check);
     #[allow(dead_code, reason = "for the compiler to see that no table is left out")]
     fn is_whole(Tables { name: _, ratings: _, flux: _, mtpa, weakening }: Tables) {
         let Mtpa { universal: _, parameters: _, start: _ } = mtpa;
@@ -188,7 +192,7 @@ fn every_scalar_of_the_traction_drive() {
     settings.check(&BUILT_IN).unwrap();
     try_tables(&BUILT_IN, |tables| settings.check(tables));
     let check = |settings: &traction::Settings| settings.check(&BUILT_IN);
-    let own = fields!(traction::Settings as traction::Settings { angle_late_s, angle_step_rad | clock, devices, gains, current_filter_ticks, drops }: f32);
+    let own = fields!(traction::Settings as traction::Settings { angle_late_s, angle_step_rad, iron_share | clock, devices, gains, current_filter_ticks, drops }: f32);
     let floats = fields!(Clock as Clock { tick_s, ticks_per_s, control_s | control_ticks }: f32);
     try_all(settings, "clock.", floats, |settings| &mut settings.clock, check);
     let ticks: [Field<Clock, u32>; 1] = [("control_ticks", |clock| &mut clock.control_ticks)];

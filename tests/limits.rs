@@ -456,7 +456,16 @@ fn aimed_share(share: f32) -> f32 {
             let (window, swing) = (None, None);
             let (udc_v, change_v, link_scale) = (1_000.0, 0.0, 1.0);
             let demand = &demand;
-            let aim = AimInput { demand, window, udc_v, change_v, link_scale, swing, limits: &limits };
+            let aim = AimInput {
+                demand,
+                window,
+                udc_v,
+                change_v,
+                link_scale,
+                swing,
+                iron_share: 0.0,
+                limits: &limits,
+            };
             controller.aim(&aim, &law);
             controller.regulate(&sample, &committed, &limits, &law);
         }

@@ -183,6 +183,7 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
                 change_v: 0.0,
                 link_scale: 1.0,
                 swing,
+                iron_share: 0.0,
                 limits: &walk.limits,
             };
             law.aim(&input, &law_of);

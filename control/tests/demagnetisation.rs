@@ -143,6 +143,7 @@ fn least_of_references<L: ControlLaw>(
                 change_v: 0.0,
                 link_scale: 1.0,
                 swing: None,
+                iron_share: 0.0,
                 limits,
             },
             &constants,
@@ -227,6 +228,7 @@ fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
             change_v: 0.0,
             link_scale: 1.0,
             swing: None,
+            iron_share: 0.0,
             limits: &limits,
         };
         law.aim(&input, &constants);

@@ -157,6 +157,7 @@ fn run(machine: &str, flux_scale: f64, sensors: Sensors) -> Outcome {
             change_v: 0.0,
             link_scale: 1.0,
             swing: None,
+            iron_share: 0.0,
             limits: &LIMITS,
         };
         identification.aim(&input, &law);

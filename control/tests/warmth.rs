@@ -49,6 +49,7 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
                     change_v: 0.0,
                     link_scale: 1.0,
                     swing: None,
+                    iron_share: 0.0,
                     limits: &limits,
                 },
                 &constants,

@@ -97,6 +97,21 @@ fn iron_takes_its_loss_as_torque() {
     assert!(none == 0.0 && weak > 0.0 && weak < 0.5 * found, "{none} N·m, {weak} N·m");
 }
 
+/// Unknown, half of the loss is 12 N·m of 784 that the rotor does not get.
+#[test]
+fn iron_loss_that_is_known_is_made_up_for() {
+    let short_nm = |flaw: &str| {
+        let chosen = catalogue::of_traction(&format!("steady --speed 3000 --torque 784 {flaw}")).unwrap();
+        let machine = chosen.machine().unwrap();
+        let figures = chosen.figures(&chosen.drive(&machine).unwrap(), &machine);
+        784.0 - figures.get("points").unwrap()[0]["torque_nm"].as_f64().unwrap()
+    };
+    let [unknown, known] = ["", "--iron-loss-known"].map(|told| short_nm(&format!("--iron-loss 50 {told}")));
+    println!("{unknown:.2} N·m missing, {known:.2} where it is known");
+    assert!((11.0..14.0).contains(&unknown), "{unknown} N·m");
+    assert!(known.abs() < 1.0, "{known} N·m");
+}
+
 /// A shaft of 40 Hz and a damping ratio of 0.05, whose far end is held.
 fn on_shaft(speed: SpeedSource) -> Plant {
     let machine = catalogue::of_traction("sweep").unwrap().machine().unwrap();
@@ -172,7 +187,7 @@ fn without_the_word_for_all_there_is_none() {
     assert_eq!((options.own.flaws.offsets(), options.own.flaws.gains()), ([0.0; 3], [0.0; 3]));
 }
 
-/// Every scenario with all flaws: no fault, and the mean torque at the characteristic points within 2 % of the demand, of which iron loss, that the drive does not know, takes up to 1.5.
+/// Every scenario with all flaws: no fault, and the mean torque at the characteristic points within 1 % of the largest torque.
 #[test]
 fn no_scenario_trips_with_all_flaws() {
     for line in [
@@ -201,7 +216,7 @@ fn no_scenario_trips_with_all_flaws() {
         for point in points.iter().filter(|_| line == "characteristic") {
             let off = point["torque_error_percent"].as_f64().unwrap();
             println!("{line}: {} r/min: {off:.2} %", point["speed_rpm"]);
-            assert!(off.abs() < 2.0, "{line}: {point}");
+            assert!(off.abs() < 1.0, "{line}: {point}");
         }
     }
 }

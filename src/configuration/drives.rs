@@ -38,7 +38,16 @@ impl traction::Settings {
     /// # Errors
     /// The first scalar that makes no sense.
     pub const fn check_settings(&self) -> Result<(), Refused> {
-        let Self { clock, devices, gains, angle_late_s, angle_step_rad, current_filter_ticks, drops } = self;
+        let Self {
+            clock,
+            devices,
+            gains,
+            angle_late_s,
+            angle_step_rad,
+            current_filter_ticks,
+            drops,
+            iron_share,
+        } = self;
         checked!(clock.check());
         checked!(devices.check(clock));
         checked!(within(&[
@@ -52,6 +61,7 @@ impl traction::Settings {
             ),
             Bound("drops.threshold_v", drops.threshold_v, 0.0, HIGHEST_THRESHOLD_V),
             Bound("drops.slope_ohm", drops.slope_ohm, 0.0, LARGEST_SLOPE_OHM),
+            Bound("iron_share", *iron_share, 0.0, 1.0),
         ]));
         gains.check()
     }

@@ -29,6 +29,7 @@ static ANGLE_STEP: AtomicU32 = AtomicU32::new(0);
 static CURRENT_FILTER: AtomicU32 = AtomicU32::new(0);
 static THRESHOLD: AtomicU32 = AtomicU32::new(0);
 static SLOPE: AtomicU32 = AtomicU32::new(0);
+static IRON_SHARE: AtomicU32 = AtomicU32::new(0);
 
 /// Highest frequency of the free carrier, in Hz.
 const MAX_CARRIER_HZ: f32 = patterns::FREE_CARRIER_SHARE * BUILT_IN.ratings.max_switching_hz;
@@ -54,6 +55,7 @@ fn settings() -> Settings {
             threshold_v: f32::from_bits(THRESHOLD.load(Ordering::Relaxed)),
             slope_ohm: f32::from_bits(SLOPE.load(Ordering::Relaxed)),
         },
+        iron_share: f32::from_bits(IRON_SHARE.load(Ordering::Relaxed)),
     }
 }
 
@@ -72,6 +74,7 @@ fn main() -> ! {
     let Drops { threshold_v, slope_ohm } = setup.drops();
     THRESHOLD.store(threshold_v.to_bits(), Ordering::Relaxed);
     SLOPE.store(slope_ohm.to_bits(), Ordering::Relaxed);
+    IRON_SHARE.store(setup.iron_share().to_bits(), Ordering::Relaxed);
     if let Err(refused) = const { BUILT_IN.check() }.and_then(|()| settings().check_settings()) {
         qemu::refuse(&refused);
     }

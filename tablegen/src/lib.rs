@@ -17,6 +17,7 @@ mod axis;
 mod demagnetisation;
 mod error;
 mod input;
+mod iron;
 mod map;
 mod optimum;
 mod parameters;
@@ -34,6 +35,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::InputError;
 pub use input::read_bounded;
+pub use iron::Iron;
 pub use map::{FluxMap, line_of};
 pub use optimum::Optimum;
 pub use parameters::{Parameters, Patterns};

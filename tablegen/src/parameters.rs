@@ -96,6 +96,8 @@ parameters! {
         loss_rated_w: 0.0..=1e8, 0.0;
         /// Share of that loss that grows with the square of speed, 0 ..= 1; the rest is linear. Default 0.6.
         loss_quadratic_fraction: 0.0..=1.0, 0.6;
+        /// Share of that loss that is known to be the iron's, which the drive makes up for in its torque, 0 ..= 1; default 0.
+        iron_loss_share: 0.0..=1.0, 0.0;
     }
 }
 

@@ -9,7 +9,8 @@ use tractive_control::machine::{Curve, Grid, Tables};
 /// reads back as itself.
 pub fn rust_source(tables: &Tables, types: &str) -> String {
     let Tables { name, ratings, flux, mtpa, weakening } = tables;
-    let mut out = format!("use {types}::{{Curve, Grid, Machine, Mtpa, Ratings, Tables, Weakening}};\n\n");
+    let mut out =
+        format!("use {types}::{{Curve, Grid, IronLoss, Machine, Mtpa, Ratings, Tables, Weakening}};\n\n");
     let flux = grid(&mut out, "FLUX", flux);
     let parameters = grid(&mut out, "MTPA_PARAMETERS", &mtpa.parameters);
     let universal = curve(&mut out, "MTPA_UNIVERSAL", &mtpa.universal);

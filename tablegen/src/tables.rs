@@ -2,8 +2,8 @@
 
 use crate::axis::{Axis, curve, grid};
 use crate::weakening_tables::{MtpaCurrents, weakening_tables};
-use crate::{FluxMap, MachineFolder, Optimum, Parameters, SmoothMap};
-use tractive_control::machine::{Mtpa, Ratings, Tables};
+use crate::{FluxMap, Iron, MachineFolder, Optimum, Parameters, SmoothMap};
+use tractive_control::machine::{IronLoss, Mtpa, Ratings, Tables};
 
 /// Nodes of the universal curve.
 const UNIVERSAL_NODES: usize = 65;
@@ -43,7 +43,10 @@ impl MachineFolder {
         };
         Tables {
             name: parameters.name.clone().leak(),
-            ratings: ratings(parameters, smooth.at(0.0, 0.0).psi_d_wb),
+            ratings: Ratings {
+                iron: Iron::of(parameters, map, 1.0).known(),
+                ..ratings(parameters, smooth.at(0.0, 0.0).psi_d_wb)
+            },
             flux: grid(rows, columns, currents.flux(&smooth)),
             mtpa,
             weakening: weakening_tables(self, &smooth, top_flux_wb, &best.currents()),
@@ -245,6 +248,8 @@ fn ratings(parameters: &Parameters, magnet_flux_wb: f64) -> Ratings {
         trip_dc_under_v: parameters.trip_dc_under_v as f32,
         trip_speed_rad_s: (parameters.trip_speed_rpm * rad_s) as f32,
         torque_slew_nm_s: parameters.torque_slew_nm_per_s as f32,
+        iron: IronLoss::NONE,
+        iron_share: parameters.iron_loss_share as f32,
     }
 }
 

@@ -84,7 +84,8 @@ impl PowerStage {
             rates::settings(control_hz, min_pulse_ns, dead_time_ns, carrier_hz, behind_line_filter);
         let angle_step_rad = Settings::step_rad(encoder_counts, ratings.pole_pairs);
         let current_filter_ticks = (current_filter_s * settings.clock.ticks_per_s + 0.5) as u32;
-        Settings { angle_late_s, angle_step_rad, current_filter_ticks, drops, ..settings }
+        let iron_share = ratings.iron_share;
+        Settings { angle_late_s, angle_step_rad, current_filter_ticks, drops, iron_share, ..settings }
     }
 
     /// The dead time for the generator, never shorter than asked for; `None` if it cannot make one.

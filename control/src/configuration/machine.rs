@@ -38,6 +38,8 @@ impl Ratings {
             trip_dc_under_v,
             trip_speed_rad_s,
             torque_slew_nm_s,
+            iron: _,
+            iron_share,
         } = *self;
         checked!(within(&[
             Bound("ratings.pole_pairs", pole_pairs, 1.0, 100.0),
@@ -57,6 +59,7 @@ impl Ratings {
             Bound("ratings.trip_dc_under_v", trip_dc_under_v, 0.0, 1e6),
             Bound("ratings.trip_speed_rad_s", trip_speed_rad_s, ABOVE_ZERO, 1.1e6),
             Bound("ratings.torque_slew_nm_s", torque_slew_nm_s, ABOVE_ZERO, 1e9),
+            Bound("ratings.iron_share", iron_share, 0.0, 1.0),
         ]));
         self.check_together()
     }
@@ -181,8 +184,20 @@ impl Tables {
         // The table's nodes lie a little off the map, so that it is right on average.
         let off = 0.05 * largest_wb(weakening);
         checked!(near("ratings.magnet_flux_wb", ratings.magnet_flux_wb, rest_wb(flux), off));
+        checked!(check_iron(ratings, largest_wb(weakening)));
         check_mtpa(mtpa, flux, ratings)
     }
+}
+
+/// Iron that takes no more than the largest torque where that ends, with the largest flux linkage.
+const fn check_iron(ratings: &Ratings, largest_wb: f32) -> Result<(), Refused> {
+    let Ratings { max_torque_nm, max_power_w, pole_pairs, iron, .. } = *ratings;
+    let omega = max_power_w / max_torque_nm * pole_pairs;
+    let most = max_torque_nm / (largest_wb * largest_wb);
+    within(&[
+        Bound("ratings.iron.hysteresis", iron.hysteresis, 0.0, most),
+        Bound("ratings.iron.eddy", iron.eddy, 0.0, most / omega),
+    ])
 }
 
 /// Flux linkage of a checked map without current, at least 0.

@@ -66,6 +66,8 @@ pub struct AimInput<'a> {
     pub link_scale: f32,
     /// The link's swing, where it is to be damped.
     pub swing: Option<LinkSwing>,
+    /// The share of the machine's iron loss that is made up for, 0 ..= 1: torque is then the rotor's, not the air gap's.
+    pub iron_share: f32,
     /// The limits of the mode.
     pub limits: &'a ModeLimits,
 }
@@ -203,14 +205,19 @@ impl ControlLaw for Controller {
     }
 
     fn aim(&mut self, input: &AimInput, law: &Law) {
-        let AimInput { demand, window, udc_v, change_v, link_scale, swing, limits } = *input;
+        let AimInput { demand, window, udc_v, change_v, link_scale, swing, iron_share, limits } = *input;
         let (tables, ratings, omega) = (law.tables, &law.tables.ratings, self.speed.omega());
         let Scales { torque, flux } = self.map_error.scales();
         let map_nm = self.sum_nm / self.samples as f32;
-        let measured_nm = map_nm * torque;
+        let iron_nm = if iron_share == 0.0 {
+            0.0
+        } else {
+            iron_share * ratings.iron.torque_nm(self.target.flux, omega)
+        };
+        let measured_nm = map_nm * torque - iron_nm;
         let period_s = self.passed_s(law.clock);
         (self.sum_nm, self.samples) = (0.0, 0);
-        self.flowing_nm += (map_nm * self.map_error.known_torque_scale() - self.flowing_nm)
+        self.flowing_nm += (map_nm * self.map_error.known_torque_scale() - iron_nm - self.flowing_nm)
             * (period_s / (period_s + TOLD_S));
         let can_step = limits.follows == Regulated::Mean;
         let shaping =
@@ -226,12 +233,19 @@ impl ControlLaw for Controller {
         let more_nm = trim_nm + damping_nm;
         let outwards = |nm: f32| if demand_nm < 0.0 { demand_nm - nm } else { demand_nm + nm };
         let (trimmed_nm, damped_nm) = (outwards(more_nm), outwards(damping_nm));
-        let point = reference::point(trimmed_nm / torque, omega, &limit, self.resistance_ohm(tables), tables);
+        let point = reference::point(
+            (trimmed_nm + iron_nm) / torque,
+            omega,
+            &limit,
+            self.resistance_ohm(tables),
+            tables,
+        );
         let modulation_index = point.modulation_index
             * swing.map_or(link.slow_v / self.link.lowest_v(), |swing| link.slow_v * swing.per_slow_v)
             - DEPTH_PER_TORQUE / ratings.max_torque_nm * more_nm;
         let limited = point.region == Region::Limit;
-        let given_nm = if limited { nearer_zero(point.torque_nm * torque, demand_nm) } else { demand_nm };
+        let given_nm =
+            if limited { nearer_zero(point.torque_nm * torque - iron_nm, demand_nm) } else { demand_nm };
         self.trim.step(&torque_trim::Input {
             demand_nm,
             measured_nm: swing.map_or(measured_nm, |_| measured_nm - (damped_nm - demand_nm)),

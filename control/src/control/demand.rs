@@ -136,6 +136,7 @@ fn envelope_nm(omega: f32, ratings: &Ratings) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::IronLoss;
 
     #[test]
     fn the_link_ends_motoring_and_braking_whichever_way_it_turns() {
@@ -182,6 +183,8 @@ mod tests {
             trip_dc_under_v: 900.0,
             trip_speed_rad_s: 2_700.0,
             torque_slew_nm_s: 8_000.0,
+            iron: IronLoss::NONE,
+            iron_share: 0.0,
         };
         let begins_nm = |flowing_nm: f32, can_step: bool| {
             let demand = Demand { torque_nm: 0.0, slew_limited: true };

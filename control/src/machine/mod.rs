@@ -8,8 +8,10 @@
 
 #![forbid(unsafe_code)]
 
+mod iron_loss;
 mod lookup;
 
+pub use iron_loss::IronLoss;
 pub use lookup::{Curve, Grid};
 
 /// Scalars of a machine folder. SI units, peak values of phase quantities.
@@ -50,6 +52,10 @@ pub struct Ratings {
     pub trip_speed_rad_s: f32,
     /// Slew rate of the torque demand, in N·m/s.
     pub torque_slew_nm_s: f32,
+    /// Iron loss, were all of the loss that the folder names the iron's.
+    pub iron: IronLoss,
+    /// The iron's share of that loss, 0 ..= 1, as far as it is known.
+    pub iron_share: f32,
 }
 
 impl Ratings {

@@ -35,7 +35,7 @@ const FLAWS: [(&str, &str); 19] = [
     ("drops of IGBTs and diodes", "--device-drop 2,5,1.5,3"),
     ("slots", "--slots 2"),
     ("resistance", "--rs-error 20"),
-    ("iron loss as torque", "--iron-loss 50"),
+    ("iron loss as torque, which the drive knows", "--iron-loss 50 --iron-loss-known"),
     ("elastic shaft", "--shaft 40,0.05"),
     ("all", "--real"),
 ];

@@ -16,7 +16,7 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
         given.max_power_w.min(digits((1.0 - 1e-6) * max_torque_nm * given.max_speed_rpm * TAU / 60.0));
     let (resistance, inertia) =
         (digits(outcome.fit.resistance_ohm.max(0.0)), digits(outcome.rotor.inertia_kg_m2));
-    let keys: [(&str, f64, &str); 20] = [
+    let keys: [(&str, f64, &str); 21] = [
         ("pole_pairs", f64::from(given.pole_pairs), "given"),
         ("stator_resistance_ohm", resistance, "identified"),
         ("max_torque_nm", max_torque_nm, "given, as far as the map gives it"),
@@ -37,6 +37,7 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
         ("rotor_inertia_kg_m2", inertia, "identified"),
         ("loss_rated_w", given.loss_rated_w, "given"),
         ("loss_quadratic_fraction", given.loss_quadratic_fraction, "given"),
+        ("iron_loss_share", given.iron_loss_share, "given"),
     ];
     toml(&given.name, "identify", &keys)
 }

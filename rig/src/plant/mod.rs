@@ -6,7 +6,6 @@
 
 mod dc_link;
 mod devices;
-mod iron;
 mod legs;
 mod line_filter;
 mod motor;

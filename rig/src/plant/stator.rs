@@ -1,9 +1,8 @@
 //! A machine's stator equation in the rotor frame.
 
 use super::PlantSettings;
-use super::iron::Iron;
 use super::runge_kutta::rotated;
-use tractive_tablegen::{FluxMap, FluxPoint, MachineFolder, SmoothMap};
+use tractive_tablegen::{FluxMap, FluxPoint, Iron, MachineFolder, SmoothMap};
 
 /// Stator of a machine: `L(i) di/dt = u − R i − jω ψ(i)`, with the incremental inductances of the flux map.
 #[derive(Clone, Debug)]
@@ -73,7 +72,7 @@ impl Stator {
             scale: settings.flux_scale,
             lost_wb: 0.0,
             slots_wb: settings.slots_share / SLOT_ORDER * magnet_wb,
-            iron: Iron::of(machine, settings.iron_share),
+            iron: Iron::of(&machine.parameters, &machine.map, settings.iron_share),
             pole_pairs: f64::from(parameters.pole_pairs),
             rated_ohm: parameters.stator_resistance_ohm,
             resistance_ohm: parameters.stator_resistance_ohm * settings.resistance_scale,

@@ -189,6 +189,7 @@ impl<L: ControlLaw> Axis<L> {
                 change_v: 0.0,
                 link_scale: 1.0,
                 swing: None,
+                iron_share: 0.0,
                 limits: &limits,
             };
             self.controller.aim(&aim, &law);

@@ -50,6 +50,8 @@ pub struct Settings {
     pub current_filter_ticks: u32,
     /// The devices' drops.
     pub drops: Drops,
+    /// The share of the machine's iron loss that is made up for, 0 ..= 1.
+    pub iron_share: f32,
 }
 
 /// Drops, which a current through a leg loses of the link's voltage: means of IGBT and diode.
@@ -85,6 +87,7 @@ impl Settings {
             angle_step_rad: 0.0,
             current_filter_ticks: 0,
             drops: Drops::NONE,
+            iron_share: 0.0,
         }
     }
 

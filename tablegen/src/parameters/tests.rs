@@ -100,6 +100,8 @@ fn ranges_hold_their_ends() {
         ("pole_pairs = 100", "pole_pairs = 101"),
         ("loss_quadratic_fraction = 0", "loss_quadratic_fraction = -0.001"),
         ("loss_quadratic_fraction = 1.0", "loss_quadratic_fraction = 1.001"),
+        ("iron_loss_share = 0", "iron_loss_share = -0.001"),
+        ("iron_loss_share = 1.0", "iron_loss_share = 1.001"),
         ("stator_resistance_ohm = 0", "stator_resistance_ohm = -1e-9"),
         ("max_switching_hz = 1e5", "max_switching_hz = 100_001"),
         ("rotor_inertia_kg_m2 = 1e-9", "rotor_inertia_kg_m2 = 0.9e-9"),
@@ -127,6 +129,7 @@ fn defaults_of_the_linear_machine() {
         (parameters.rotor_inertia_kg_m2, 0.070_028_174_96),
         (parameters.loss_rated_w, 0.0),
         (parameters.loss_quadratic_fraction, 0.6),
+        (parameters.iron_loss_share, 0.0),
     ] {
         near(value, expected, 1e-9);
     }

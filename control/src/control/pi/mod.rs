@@ -36,7 +36,7 @@
 //! for _ in 0..20 {
 //!     let demand = Demand { torque_nm: 700.0, slew_limited: false };
 //!     pi.observe(&sample, &tables);
-//!     let input = AimInput { demand: &demand, window: None, udc_v: 1_500.0, change_v: 0.0, link_scale: 1.0, swing: None, limits: &limits };
+//!     let input = AimInput { demand: &demand, window: None, udc_v: 1_500.0, change_v: 0.0, link_scale: 1.0, swing: None, iron_share: 0.0, limits: &limits };
 //!     pi.aim(&input, &law);
 //! }
 //! let wanted = pi.target().current;

@@ -113,6 +113,16 @@ impl TractionOptions {
         if self.current_filter_known { ticks(self.current_filter_us + self.flaws.mean_skew_us()) } else { 0 }
     }
 
+    /// Share of the iron loss that the drive is told, in thousandths.
+    fn known_iron_permille(&self, machine: &Machine) -> u32 {
+        let known = if self.iron_loss_known {
+            self.flaws.iron_loss / 100.0
+        } else {
+            machine.folder.parameters.iron_loss_share
+        };
+        (1e3 * known).round() as u32
+    }
+
     /// Mean threshold and slope of the devices that the drive is told, in mV and hundredths of a mΩ.
     fn known_drops(&self) -> (u32, u32) {
         let drops = self.flaws.drops();
@@ -208,6 +218,9 @@ pub struct TractionOptions {
     /// The drive knows of --current-filter-us and of the mean of --adc-skew-us, as by its power stage's key, and makes up for them.
     #[arg(long)]
     pub current_filter_known: bool,
+    /// The drive knows of --iron-loss, as by its machine's key, and makes up for it; up to 100 %.
+    #[arg(long)]
+    pub iron_loss_known: bool,
     /// The true machine, where it is not the one that control knows: a folder of tables/, or the path of any machine folder.
     #[arg(long, value_name = "DIR")]
     pub plant: Option<String>,
@@ -443,6 +456,7 @@ fn filled(options: &Options, machine: &Machine) -> Options {
         current_filter_us,
         current_filter_known: true,
         angle_late_known: true,
+        iron_loss_known: true,
         angle_1f_deg,
         angle_2f_deg,
         flaws,
@@ -603,6 +617,7 @@ fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool)
         current_filter_ticks: options.own.known_filter_ticks(),
         threshold_mv,
         slope_10uohm,
+        iron_permille: options.own.known_iron_permille(machine),
         train: plan.train,
     }
 }
@@ -639,6 +654,7 @@ fn tasks<'a, L: ControlLaw>(
         angle_step_rad: setup.angle_step_rad,
         current_filter_ticks: setup.current_filter_ticks,
         drops: setup.drops(),
+        iron_share: setup.iron_share(),
         gains,
         ..Settings::new(clock(options, machine), devices)
     };

@@ -142,6 +142,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             change_v: self.ahead.next_v,
             link_scale: self.link_scale,
             swing,
+            iron_share: self.settings.iron_share,
             limits: &self.limits,
         };
         self.controller.aim(&aim, &Law { gains, clock, tables });

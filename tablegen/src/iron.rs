@@ -3,7 +3,8 @@
 //! `T = T_rated (ψ/ψ_rated)² (f n/n_rated + (1 − f) sign n)`: hysteresis loses the same in every turn, eddy currents the more the faster it is, both by the
 //! square of the flux linkage. The currents know nothing of it.
 
-use tractive_tablegen::{MachineFolder, SmoothMap};
+use crate::{FluxMap, Parameters, SmoothMap};
+use tractive_control::machine::IronLoss;
 
 /// Speed below which hysteresis fades, electrical, in rad/s.
 const LEAST_RAD_S: f64 = 2.0;
@@ -23,14 +24,13 @@ impl Iron {
 
     /// The iron of a machine, which has this share of the loss that its folder names, at rated speed and rated torque. The part that grows with the square
     /// of speed is eddy currents.
-    pub fn of(machine: &MachineFolder, share: f64) -> Self {
-        if share == 0.0 {
+    pub fn of(parameters: &Parameters, map: &FluxMap, share: f64) -> Self {
+        if share == 0.0 || parameters.loss_rated_w == 0.0 {
             return Self::NONE;
         }
-        let parameters = &machine.parameters;
         let rated_rad_s = parameters.rated_speed_rpm * core::f64::consts::TAU / 60.0;
         let torque_nm = share * parameters.loss_rated_w / rated_rad_s;
-        let per_square = torque_nm / rated_square(machine);
+        let per_square = torque_nm / rated_square(parameters, &SmoothMap::new(map));
         let eddy_share = parameters.loss_quadratic_fraction;
         Self {
             hysteresis: (1.0 - eddy_share) * per_square,
@@ -44,6 +44,11 @@ impl Iron {
         self.hysteresis != 0.0 || self.eddy != 0.0
     }
 
+    /// As a drive knows it.
+    pub fn known(&self) -> IronLoss {
+        IronLoss { hysteresis: self.hysteresis as f32, eddy: self.eddy as f32 }
+    }
+
     /// The torque against the rotor, positive forward, in N·m, at the square of the flux linkage, in Wb², and an electrical speed, in rad/s.
     pub fn torque_nm(&self, square: f64, omega: f64) -> f64 {
         square * (self.hysteresis * (omega / LEAST_RAD_S).clamp(-1.0, 1.0) + self.eddy * omega)
@@ -51,10 +56,9 @@ impl Iron {
 }
 
 /// Square of the flux linkage at rated torque with the least current, in Wb².
-fn rated_square(machine: &MachineFolder) -> f64 {
+fn rated_square(parameters: &Parameters, map: &SmoothMap) -> f64 {
     const ANGLES: u32 = 90;
     const HALVINGS: u32 = 30;
-    let (parameters, map) = (&machine.parameters, SmoothMap::new(&machine.map));
     let pole_pairs = f64::from(parameters.pole_pairs);
     let gives = |id_a: f64, iq_a: f64| {
         let at = map.at(id_a, iq_a);
@@ -75,4 +79,27 @@ fn rated_square(machine: &MachineFolder) -> f64 {
     let (id_a, iq_a) = least.map_or((0.0, 0.0), |(_, current)| current);
     let at = map.at(id_a, iq_a);
     at.psi_d_wb * at.psi_d_wb + at.psi_q_wb * at.psi_q_wb
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MachineFolder;
+    use tractive_control::frames::Dq;
+
+    #[test]
+    fn a_drive_knows_the_same_torque() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tables/pmasynrm-180kw");
+        let machine = MachineFolder::read(std::path::Path::new(folder)).unwrap();
+        let iron = Iron::of(&machine.parameters, &machine.map, 1.0);
+        let known = iron.known();
+        assert_eq!(machine.tables().ratings.iron, known);
+        for (d, q, omega) in [(0.4, -1.2, 838.0), (0.9, 0.3, -1_500.0), (1.0, 0.2, 0.8), (0.7, 0.0, 0.0)] {
+            let exact = iron.torque_nm(f64::from(d * d + q * q), f64::from(omega));
+            let told = known.torque_nm(Dq { d, q }, omega);
+            assert!((f64::from(told) - exact).abs() <= 1e-5 * exact.abs(), "{told} N·m, {exact} N·m");
+            assert!(exact.abs() > 1.0 || omega == 0.0, "{exact} N·m");
+        }
+        assert_eq!(Iron::of(&machine.parameters, &machine.map, 0.0).known(), IronLoss::NONE);
+    }
 }
