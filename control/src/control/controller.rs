@@ -208,17 +208,9 @@ impl ControlLaw for Controller {
         let AimInput { demand, window, udc_v, change_v, link_scale, swing, iron_share, limits } = *input;
         let (tables, ratings, omega) = (law.tables, &law.tables.ratings, self.speed.omega());
         let Scales { torque, flux } = self.map_error.scales();
-        let map_nm = self.sum_nm / self.samples as f32;
-        let iron_nm = if iron_share == 0.0 {
-            0.0
-        } else {
-            iron_share * ratings.iron.torque_nm(self.target.flux, omega)
-        };
-        let measured_nm = map_nm * torque - iron_nm;
         let period_s = self.passed_s(law.clock);
-        (self.sum_nm, self.samples) = (0.0, 0);
-        self.flowing_nm += (map_nm * self.map_error.known_torque_scale() - iron_nm - self.flowing_nm)
-            * (period_s / (period_s + TOLD_S));
+        let iron_nm = self.iron_nm(iron_share, tables);
+        let measured_nm = self.measured_nm(iron_nm, period_s);
         let can_step = limits.follows == Regulated::Mean;
         let shaping =
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
@@ -264,18 +256,7 @@ impl ControlLaw for Controller {
             modulation_index,
             voltage_limit_v: limits.index_limit * six_step_v(link.usable_v),
         };
-        let OperatingPoint { current, flux, .. } = point;
-        self.map_error.step(&map_error::Input {
-            disturbance: self.disturbance.mean(),
-            explained: 1.0 - link_scale,
-            current,
-            flux,
-            omega,
-            period_s,
-            resistance_from: law.gains.resistance_from,
-            largest_a: ratings.max_current_a,
-            fastest: ratings.max_speed_rad_s * ratings.pole_pairs,
-        });
+        self.learn_map(&point, link_scale, period_s, law);
     }
 
     #[inline(always)]
@@ -315,6 +296,43 @@ impl ControlLaw for Controller {
 }
 
 impl Controller {
+    /// Torque that the iron takes, in N·m, of which this share is made up for.
+    #[inline(always)]
+    fn iron_nm(&self, share: f32, tables: &Tables) -> f32 {
+        if share == 0.0 {
+            0.0
+        } else {
+            share * tables.ratings.iron.torque_nm(self.target.flux, self.speed.omega())
+        }
+    }
+
+    /// Mean torque since the last operating point, in N·m, of which the iron takes a part.
+    #[inline(always)]
+    fn measured_nm(&mut self, iron_nm: f32, period_s: f32) -> f32 {
+        let map_nm = self.sum_nm / self.samples as f32;
+        (self.sum_nm, self.samples) = (0.0, 0);
+        self.flowing_nm += (map_nm * self.map_error.known_torque_scale() - iron_nm - self.flowing_nm)
+            * (period_s / (period_s + TOLD_S));
+        map_nm * self.map_error.scales().torque - iron_nm
+    }
+
+    /// Learns the map's error from what the integral part explains at an operating point.
+    #[inline(always)]
+    fn learn_map(&mut self, point: &OperatingPoint, link_scale: f32, period_s: f32, law: &Law) {
+        let ratings = &law.tables.ratings;
+        self.map_error.step(&map_error::Input {
+            disturbance: self.disturbance.mean(),
+            explained: 1.0 - link_scale,
+            current: point.current,
+            flux: point.flux,
+            omega: self.speed.omega(),
+            period_s,
+            resistance_from: law.gains.resistance_from,
+            largest_a: ratings.max_current_a,
+            fastest: ratings.max_speed_rad_s * ratings.pole_pairs,
+        });
+    }
+
     /// Stator resistance of a phase, in ohm.
     #[inline(always)]
     fn resistance_ohm(&self, tables: &Tables) -> f32 {
