@@ -4,6 +4,11 @@ use super::{Branch, Pattern};
 use crate::frames::{AlphaBeta, limit};
 use crate::modulation::{CarrierHalf, SwitchLimits};
 
+/// Share of a half's ticks from which volt-seconds are far off.
+const FAR_SHARE: f32 = 0.1;
+/// Part of what lies across that is then made along. Chosen by trial: 0.3 leaves 231 A; from 1.5 on the flux linkage goes astray.
+const LEAN: f32 = 0.5;
+
 /// One phase's part of a carrier half.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Part {
@@ -25,7 +30,18 @@ pub fn half(
     devices: &SwitchLimits,
 ) -> CarrierHalf {
     let parts = branch.parts(half, index);
-    played(&parts, period_ticks, more_ticks, devices)
+    let far_ticks = FAR_SHARE * period_ticks as f32;
+    let has_one_edge = parts.iter().filter(|part| part.edge.is_some()).count() == 1;
+    let leans = has_one_edge && more_ticks.squared() > far_ticks * far_ticks;
+    played(&parts, period_ticks, if leans { leaning(more_ticks) } else { more_ticks }, devices)
+}
+
+/// Volt-seconds that lead the flux linkage to its magnitude by the one direction that there is, the voltage's, to which the magnitude lies across: flux linkage that is turned
+/// ahead grows, turned back it shrinks. Where more of it is left than this it never gets there: with a tenth less than by the map 306 A flowed when torque fell
+/// to none at 1,196 r/min, now 190 A. For small errors the direction itself is better, at switches above all.
+fn leaning(more_ticks: AlphaBeta) -> AlphaBeta {
+    let AlphaBeta { alpha, beta } = more_ticks;
+    AlphaBeta { alpha: alpha - LEAN * beta, beta: beta + LEAN * alpha }
 }
 
 /// The half of these parts, with their edges moved.
@@ -260,6 +276,38 @@ mod tests {
                 assert!(got.dot(more - got).abs() < 0.03 * more.squared(), "{at}: {got:?}");
             }
         }
+    }
+
+    /// A lone edge moves for a part of what lies across its phase, where that is far off; toward a phase from its neighbours is across it.
+    #[test]
+    fn a_lone_edge_moves_for_what_lies_across_it_where_that_is_far() {
+        let branch = Mode::named("opp9a").and_then(Mode::branch).unwrap();
+        let period = PERIOD as f32;
+        let mut lone = 0;
+        for at in 0..4 * branch.quarter() {
+            let parts = branch.parts(at, 0.3);
+            let edges = parts.map(|part| part.edge);
+            let (Some(phase), 1) = (edges.iter().position(Option::is_some), edges.iter().flatten().count())
+            else {
+                continue;
+            };
+            if !edges[phase].is_some_and(|edge| (0.2..0.8).contains(&edge)) {
+                continue;
+            }
+            lone += 1;
+            let axis = core::f32::consts::TAU / 3.0 * phase as f32;
+            let across = AlphaBeta { alpha: axis.sin(), beta: -axis.cos() };
+            let longer = |share: f32| {
+                let [plain, moved] = [0.0, share]
+                    .map(|share| half(branch, at, PERIOD, (0.3, across * (share * period)), &DEVICES));
+                (moved.on_ticks(0)[phase] as f32 - plain.on_ticks(0)[phase] as f32) / period
+            };
+            assert_eq!(longer(0.9 * FAR_SHARE), 0.0, "half {at}");
+            for far in [1.1 * FAR_SHARE, -1.1 * FAR_SHARE] {
+                assert!((longer(far) - 1.5 * LEAN * far).abs() < 2e-4, "half {at}: {}", longer(far));
+            }
+        }
+        assert!(lone > 10, "{lone} halves");
     }
 
     #[test]
