@@ -465,6 +465,29 @@ fn new(values: &str, place: &Path, name: &str) -> PathBuf {
     folder
 }
 
+/// Iron whose L_q keeps 0.3 of itself: what was seen beyond the bound tells how much less the next pulse is to go.
+#[test]
+fn much_saturation_keeps_the_bound_of_current() {
+    const VALUES: &str = "--pole-pairs 2 --rs 0.1 --ld 0.5e-3 --lq 3e-3 --psi-f 0 --saturation 0.3 --max-current 30 --udc 48 \
+         --max-speed-rpm 3000 --max-switching-hz 16000";
+    let place = tempfile::tempdir().unwrap();
+    let machine = Machine::load(new(VALUES, place.path(), "much").to_str().unwrap()).unwrap();
+    let flaws = flaws_of(&machine).join(" ");
+    let stand = identification::Stand {
+        inertia_kg_m2: machine.folder.parameters.rotor_inertia_kg_m2,
+        fault_at_s: None,
+    };
+    (1..=4).into_par_iter().for_each(|seed| {
+        let options = parsed(&format!("{flaws} --seed {seed}")).options;
+        let recording = identification::drive(&options, &machine, &stand).unwrap();
+        let trip = recording.rows.iter().find_map(|row| row.trip);
+        let peak_a = recording.rows.iter().map(|row| row.id_a.hypot(row.iq_a)).fold(0.0, f64::max);
+        let peak_share = peak_a / machine.folder.parameters.max_current_a;
+        println!("seed {seed}: {peak_share:.3} of the bound");
+        assert!(trip.is_none() && peak_share < 1.1, "seed {seed}: {trip:?}, {peak_share} of the bound");
+    });
+}
+
 /// Iron goes on to saturate where no pulse has been, and so does the map: at the peaks of ripple, as good as the flux linkage's mean error is to be within the bound.
 #[test]
 fn the_map_goes_on_with_its_bend_where_ripple_is() {

@@ -87,6 +87,9 @@ const SMALL_SHARE: f32 = 0.01;
 /// The longest change of a half on the way to a direct current, likewise.
 const LED_SHARE: f32 = 0.05;
 
+/// Least inductance along d, as a share of the least that was seen: of the first, and once pulses along d have seen all.
+const FLOOR_SHARES: [f32; 2] = [0.2, 0.5];
+
 /// Direct currents along d, as shares of the bound, and commands for each: first those beside which no current along q takes a rotor back that
 /// turns away. Two of them show the resistance.
 const STAIRCASE: [f32; 8] = [0.1, 0.2, -0.1, -0.25, -0.5, -0.75, -0.9, -0.6];
@@ -182,7 +185,7 @@ impl Course {
     pub fn learn(&mut self, seen: &Seen, inductance: &mut Inductance, ratings: &Ratings) {
         let (bound_a, pole_pairs) = (ratings.max_current_a, ratings.pole_pairs);
         (self.omega, self.frame) = (seen.omega, seen.frame);
-        self.pulses.turned(seen);
+        self.pulses.turned(seen, bound_a);
         let change = seen.current - seen.before;
         let mean = (seen.current + seen.before) * 0.5;
         match self.stage {
@@ -205,7 +208,8 @@ impl Course {
         }
         let [along_d, along_q] = match self.stage {
             Stage::Done if self.step > 0 => [0.0; 2],
-            Stage::Staircase | Stage::Rest | Stage::Turn | Stage::Done => [HELD; 2],
+            Stage::Staircase => [HELD, 0.0],
+            Stage::Rest | Stage::Turn | Stage::Done => [HELD; 2],
             Stage::AlongQ | Stage::AlongBoth => [HELD_BESIDE, 0.0],
             _ => [0.0; 2],
         };
@@ -229,7 +233,7 @@ impl Course {
             if change.d * seen.acted.d > 0.0 {
                 inductance.learn(change, seen.acted, NOISE_SHARE * bound_a);
             }
-            inductance.settle();
+            inductance.settle(FLOOR_SHARES[0]);
             (self.commands, self.step) = (0, 1);
         } else {
             self.waited += 1;
@@ -266,7 +270,7 @@ impl Course {
             self.enter(Stage::Done);
         }
         if before == Stage::AlongD && self.stage != before {
-            inductance.settle();
+            inductance.settle(FLOOR_SHARES[1]);
         }
         let region = |share: f32, held: Dq| Region {
             along_q: self.stage != Stage::AlongD,
@@ -301,7 +305,7 @@ impl Course {
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::AlongBoth => {
-                let region = region(1.0, Dq { d: self.swept(), q: 0.0 });
+                let region = region(1.0, Dq { d: self.swept() * self.pulses.kept(), q: 0.0 });
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::Done if self.step > 0 => NONE,

@@ -16,7 +16,7 @@ const GAIN: f32 = 0.7;
 const COUPLING_WEIGHT: f32 = 0.08;
 /// Square of the largest coupling, as a share of the product of the own inductances.
 const COUPLING: f32 = 0.6;
-/// Least and most of an own inductance that a half may leave of what was known before; and the least of all, of the first that was seen.
+/// Least and most of an own inductance that a half may leave of what was known before; and the least of all along q, of the least along d.
 const LEAST_SHARE: f32 = 0.4;
 const MOST_SHARE: f32 = 1.4;
 const FLOOR_SHARE: f32 = 0.5;
@@ -40,8 +40,8 @@ pub struct Inductance {
     along_q: [Option<Matrix>; ALONG_Q],
     /// Share of the coupling that acts here: odd in the current along q.
     coupled: f32,
-    /// The least own inductance, in H.
-    floor_h: f32,
+    /// The least own inductances, in H.
+    floor_h: Dq,
 }
 
 impl Inductance {
@@ -57,7 +57,7 @@ impl Inductance {
             fields: [None; ALONG_D * ALONG_Q],
             along_q: [None; ALONG_Q],
             coupled: 1.0,
-            floor_h: 0.0,
+            floor_h: Dq { d: 0.0, q: 0.0 },
         }
     }
 
@@ -77,8 +77,8 @@ impl Inductance {
         self.here = Matrix { dd: dd * by, dq: dq * by, qq: qq * by };
     }
 
-    /// The least that was seen along d so far is the measure of the least of all.
-    pub fn settle(&mut self) {
+    /// The least that was seen along d so far is the measure of the least of all: along d this share of it.
+    pub fn settle(&mut self, share: f32) {
         let mut least_h = self.here.dd;
         // Without current along q: the first field of each row.
         for known in self.fields.iter().step_by(ALONG_Q).flatten() {
@@ -86,7 +86,7 @@ impl Inductance {
                 least_h = known.dd;
             }
         }
-        self.floor_h = FLOOR_SHARE * least_h;
+        self.floor_h = Dq { d: share * least_h, q: FLOOR_SHARE * least_h };
     }
 
     /// Moves to a current, in A: what is remembered of it holds, where it has been before; else what is of its part along q, else that from
@@ -146,11 +146,11 @@ impl Inductance {
         let scale = GAIN / (a * c - b * b);
         let (x, y) = ((c * left_d - b * left_q) * scale, (a * left_q - b * left_d) * scale);
         let before = self.here;
-        let own = |known: f32, more: f32| {
+        let own = |known: f32, more: f32, least: f32| {
             let changed = limit(known + more, LEAST_SHARE * known, MOST_SHARE * known);
-            if changed > self.floor_h { changed } else { self.floor_h }
+            if changed > least { changed } else { least }
         };
-        let (dd, qq) = (own(before.dd, d * x), own(before.qq, q * y));
+        let (dd, qq) = (own(before.dd, d * x, self.floor_h.d), own(before.qq, q * y, self.floor_h.q));
         let dq = before.dq + w_s * (q * x + d * y);
         let most = COUPLING * dd * qq;
         let dq = if dq * dq > most { dq * (most / (dq * dq)) } else { dq };

@@ -32,6 +32,9 @@ pub struct Pulses {
     omega: f32,
     /// Length of a half, in s.
     length_s: f32,
+    /// Share of the bound that the current has come into; and the part of it that the boundaries' currents keep to.
+    share: f32,
+    kept: f32,
 }
 
 /// Change of current of a command, as a share of the bound: along d alone, along q, and along d beside q.
@@ -42,8 +45,14 @@ const SLOW_SHARE: f32 = 0.017;
 const D_REACH: f32 = 0.7;
 /// Share of the way to where an axis without pulses is held that a command goes.
 const HELD_SHARE: f32 = 0.4;
-/// Share of the bound that the boundaries' currents keep to: between them there is ripple.
+/// Share of the bound that the boundaries' currents keep to: between them there is ripple. By how much less they keep to, over what a current
+/// was seen beyond its bound and more than is tolerated: where iron saturates much the next one may go further. And the least that they keep to.
 const KEPT_SHARE: f32 = 0.956;
+const OVER_GAIN: f32 = 3.0;
+const LEAST_KEPT_SHARE: f32 = 0.75;
+const TOLERATED_SHARE: f32 = 0.02;
+/// Share of the bound within which a change of current is too coarse to tell.
+const FAR_SHARE: f32 = 0.6;
 /// The change along q that a command may make where the iron saturates as the current goes outward, over the one that it is to make.
 const OUTWARD: f32 = 1.4;
 /// Largest current along +d, as a share of the bound.
@@ -68,7 +77,7 @@ const BACK_SHARE: f32 = 0.15;
 impl Pulses {
     /// Before the first pulse.
     pub const fn new() -> Self {
-        Self { d: -1.0, q: 1.0, turned_rad: 0.0, omega: 0.0, length_s: 1.0 }
+        Self { d: -1.0, q: 1.0, turned_rad: 0.0, omega: 0.0, length_s: 1.0, share: 1.0, kept: KEPT_SHARE }
     }
 
     /// A number of this a half, per s.
@@ -76,8 +85,17 @@ impl Pulses {
         number / self.length_s
     }
 
-    /// Notes by how much the rotor has turned in a half.
-    pub fn turned(&mut self, seen: &Seen) {
+    /// The part of [`KEPT_SHARE`] that the boundaries' currents keep to, as none has gone further yet than it should.
+    pub fn kept(&self) -> f32 {
+        self.kept / KEPT_SHARE
+    }
+
+    /// Notes by how much the rotor has turned in a half, and whether the current has gone beyond its bound, in A.
+    pub fn turned(&mut self, seen: &Seen, bound_a: f32) {
+        let kept = KEPT_SHARE - OVER_GAIN * (seen.current.length() / bound_a - self.share - TOLERATED_SHARE);
+        if self.share > FAR_SHARE && kept < self.kept {
+            self.kept = if kept > LEAST_KEPT_SHARE { kept } else { LEAST_KEPT_SHARE };
+        }
         self.turned_rad += seen.turned;
         self.omega = seen.omega;
     }
@@ -113,7 +131,10 @@ impl Pulses {
 
     /// The change of current that the command is to make from what flows `ahead`: on as before, unless that would leave the region.
     pub fn change(&mut self, ahead: Dq, region: &Region, inductance: &Inductance) -> Dq {
-        let bound_a = region.share * KEPT_SHARE * region.bound_a;
+        let bound_a = region.share * self.kept * region.bound_a;
+        if ahead.squared() <= bound_a * bound_a {
+            self.share = region.share;
+        }
         let inside = |Dq { d, q }: Dq| (ahead + Dq { d, q: q * OUTWARD }).squared() <= bound_a * bound_a;
         let before = self.along(region);
         let mut change = self.wanted(ahead, region, inductance);
@@ -165,7 +186,7 @@ impl Pulses {
     fn sides(&self, region: &Region) -> [f32; 2] {
         let share = self.away(region.ratings.pole_pairs, AHEAD_HALVES * self.length_s + AHEAD_S);
         [1.0 + share, 1.0 - share]
-            .map(|side| limit(side, LEAST_SIDE, 1.0) * region.share * KEPT_SHARE * region.bound_a)
+            .map(|side| limit(side, LEAST_SIDE, 1.0) * region.share * self.kept * region.bound_a)
     }
 }
 
