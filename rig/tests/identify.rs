@@ -465,7 +465,7 @@ fn new(values: &str, place: &Path, name: &str) -> PathBuf {
     folder
 }
 
-/// Iron whose L_q keeps 0.3 of itself: what was seen beyond the bound tells how much less the next pulse is to go.
+/// Iron whose L_q keeps 0.3 of itself: what was seen beyond the bound tells how much less the next pulse is to go. Four seeds: the next two go 14 and 17 % beyond it.
 #[test]
 fn much_saturation_keeps_the_bound_of_current() {
     const VALUES: &str = "--pole-pairs 2 --rs 0.1 --ld 0.5e-3 --lq 3e-3 --psi-f 0 --saturation 0.3 --max-current 30 --udc 48 \
