@@ -37,9 +37,10 @@ pub fn half(
     played(&parts, period_ticks, if leans { leaning(more_ticks) } else { more_ticks }, devices)
 }
 
-/// Volt-seconds that lead the flux linkage to its magnitude by the one direction that there is, the voltage's, to which the magnitude lies across: flux linkage that is turned
-/// ahead grows, turned back it shrinks. Where more of it is left than this it never gets there: with a tenth less than by the map 306 A flowed when torque fell
-/// to none at 1,196 r/min, now 212 A. For small errors the direction itself is better, at switches above all.
+/// Volt-seconds that lead the flux linkage to its magnitude by the one direction that there is, the voltage's, to which the magnitude lies
+/// across: flux linkage that is turned ahead grows, turned back it shrinks. Far from it the magnitude never gets there without: with a tenth less
+/// than by the map 306 A flowed when torque fell to none at 1,196 r/min, now 212 A. For small errors the direction itself is better, at switches
+/// above all.
 fn leaning(more_ticks: AlphaBeta) -> AlphaBeta {
     let AlphaBeta { alpha, beta } = more_ticks;
     AlphaBeta { alpha: alpha - LEAN * beta, beta: beta + LEAN * alpha }
