@@ -139,4 +139,14 @@ mod tests {
             assert_eq!(got, shorted, "{period_s} s");
         }
     }
+
+    #[test]
+    fn a_machine_that_generates_is_told_by_its_largest_current_and_what_counts_as_one() {
+        let ratings = &BUILT_IN.ratings;
+        let currents_a = Abc { a: 40.0, b: -70.0, c: 30.0 };
+        let open = OpenGates { currents_a, udc_v: 500.0, omega: ratings.max_speed_rad_s, period_s: 1e-4 };
+        let (fault, found_a, limit_a) = generating(&open, ratings);
+        assert_eq!((fault, found_a), (Fault::CurrentOffset, 70.0));
+        assert_eq!(limit_a, FLOWING_SHARE * ratings.max_current_a);
+    }
 }

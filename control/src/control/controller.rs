@@ -302,7 +302,7 @@ impl Controller {
         if share == 0.0 {
             0.0
         } else {
-            share * tables.ratings.iron.torque_nm(self.target.flux, self.speed.omega())
+            share * tables.ratings.iron.torque_nm(self.target.flux.squared(), self.speed.omega())
         }
     }
 

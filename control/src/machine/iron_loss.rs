@@ -1,7 +1,5 @@
 //! Iron loss, as a torque that brakes the rotor.
 
-use crate::frames::{Dq, limit_magnitude};
-
 /// Electrical speed below which hysteresis fades, in rad/s.
 const LEAST_RAD_S: f32 = 2.0;
 
@@ -20,10 +18,10 @@ impl IronLoss {
     /// Without loss.
     pub const NONE: Self = Self { hysteresis: 0.0, eddy: 0.0 };
 
-    /// The torque against the rotor, positive forward, in N·m, at a flux linkage in Wb and an electrical speed in rad/s.
+    /// The torque against the rotor, positive forward, in N·m, at a square of the flux linkage in Wb² and an electrical speed in rad/s.
     #[inline(always)]
-    pub fn torque_nm(&self, flux: Dq, omega: f32) -> f32 {
-        let sign = limit_magnitude(omega * (1.0 / LEAST_RAD_S), 1.0);
-        (flux.d * flux.d + flux.q * flux.q) * (self.hysteresis * sign + self.eddy * omega)
+    pub fn torque_nm(&self, square_wb2: f32, omega: f32) -> f32 {
+        let sign = (omega * (1.0 / LEAST_RAD_S)).clamp(-1.0, 1.0);
+        square_wb2 * (self.hysteresis * sign + self.eddy * omega)
     }
 }

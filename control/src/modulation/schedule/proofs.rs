@@ -490,3 +490,18 @@ fn an_optimised_pattern_is_kept_down_to_its_smallest_index() {
     }
     assert!(exactly > 0, "no voltage makes just a smallest index");
 }
+
+/// The paper's patterns keep their borders, whatever control fills a pattern up to before square wave: a build without the optimised patterns has the same.
+#[cfg(feature = "optimal")]
+#[test]
+fn the_papers_borders_are_without_a_floor() {
+    let wanted = |ladder, mode| {
+        let case = Case::new(ladder, SHORTEST[1]);
+        let rate = first(f32::MAX, |rate| 900.0 * case.share(rate) >= 295.9);
+        let seen =
+            Reference { rate, modulation_index: 0.5, voltage_v: 900.0, udc_v: LINK_V, ..Reference::NONE };
+        case.schedule().wanted(Instant(0), mode, &seen, &case.devices)
+    };
+    assert_eq!(wanted(Ladder::PAPER, Mode::Mid3), Mode::Mid3);
+    assert_eq!(wanted(Ladder::OPTIMAL, Mode::Opp3a), Mode::Opp3b);
+}
