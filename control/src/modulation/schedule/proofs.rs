@@ -497,7 +497,7 @@ fn an_optimised_pattern_is_kept_down_to_its_smallest_index() {
 fn the_papers_borders_are_without_a_floor() {
     let wanted = |ladder, mode| {
         let case = Case::new(ladder, SHORTEST[1]);
-        let rate = first(f32::MAX, |rate| 900.0 * case.share(rate) >= 295.9);
+        let rate = first(f32::MAX, |rate| 900.0 * case.share(rate) >= 296.5);
         let seen =
             Reference { rate, modulation_index: 0.5, voltage_v: 900.0, udc_v: LINK_V, ..Reference::NONE };
         case.schedule().wanted(Instant(0), mode, &seen, &case.devices)
