@@ -10,7 +10,7 @@ use tractive_control::machine::IronLoss;
 const LEAST_RAD_S: f64 = 2.0;
 
 /// The iron of a machine.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Iron {
     /// Torque of hysteresis over the square of the flux linkage, in N·m/Wb².
     hysteresis: f64,
@@ -25,7 +25,7 @@ impl Iron {
     /// The iron of a machine, which has this share of the loss that its folder names, at rated speed and rated torque. The part that grows with the square
     /// of speed is eddy currents.
     pub fn of(parameters: &Parameters, map: &FluxMap, share: f64) -> Self {
-        if share == 0.0 || parameters.loss_rated_w == 0.0 {
+        if share == 0.0 {
             return Self::NONE;
         }
         let rated_rad_s = parameters.rated_speed_rpm * core::f64::consts::TAU / 60.0;
@@ -41,7 +41,7 @@ impl Iron {
     /// `true` if it loses anything.
     #[inline]
     pub fn is_some(&self) -> bool {
-        self.hysteresis != 0.0 || self.eddy != 0.0
+        *self != Self::NONE
     }
 
     /// As a drive knows it.
@@ -64,7 +64,7 @@ fn rated_square(parameters: &Parameters, map: &SmoothMap) -> f64 {
         let at = map.at(id_a, iq_a);
         1.5 * pole_pairs * (at.psi_d_wb * iq_a - at.psi_q_wb * id_a) >= parameters.rated_torque_nm
     };
-    // The current in each direction that gives the torque.
+    // The current in each direction that gives the torque, or the largest.
     let in_direction = |angle: u32| {
         let (sin, cos) = (f64::from(angle) / f64::from(ANGLES) * core::f64::consts::FRAC_PI_2).sin_cos();
         let (mut low, mut high) = (0.0, parameters.max_current_a);
@@ -72,10 +72,9 @@ fn rated_square(parameters: &Parameters, map: &SmoothMap) -> f64 {
             let middle = 0.5 * (low + high);
             if gives(-middle * sin, middle * cos) { high = middle } else { low = middle }
         }
-        gives(-high * sin, high * cos).then_some((high, (-high * sin, high * cos)))
+        (high, (-high * sin, high * cos))
     };
-    let least = (0..=ANGLES).filter_map(in_direction).min_by(|one, other| one.0.total_cmp(&other.0));
-    // A machine that does not give its rated torque has the flux linkage of its magnets.
+    let least = (0..=ANGLES).map(in_direction).min_by(|one, other| one.0.total_cmp(&other.0));
     let (id_a, iq_a) = least.map_or((0.0, 0.0), |(_, current)| current);
     let at = map.at(id_a, iq_a);
     at.psi_d_wb * at.psi_d_wb + at.psi_q_wb * at.psi_q_wb
@@ -99,6 +98,8 @@ mod tests {
             assert!((f64::from(told) - exact).abs() <= 1e-5 * exact.abs(), "{told} N·m, {exact} N·m");
             assert!(exact.abs() > 1.0 || omega == 0.0, "{exact} N·m");
         }
-        assert_eq!(Iron::of(&machine.parameters, &machine.map, 0.0).known(), IronLoss::NONE);
+        let none = Iron::of(&machine.parameters, &machine.map, 0.0);
+        assert_eq!(none.known(), IronLoss::NONE);
+        assert!(iron.is_some() && !none.is_some());
     }
 }
