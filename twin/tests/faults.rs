@@ -16,9 +16,9 @@ fn image(system: System) -> PathBuf {
 /// Instants in the start, in µs: memory cleared, crystal, PLL, pins, timers, converters, zeros, gates' pins, breaks, watchdog, run; of either image,
 /// the ZS9's [later](later_us). The first one is that of the other faults.
 const STARTING_US: [u32; 14] =
-    [5_314, 1_000, 3_000, 4_400, 4_611, 4_616, 5_135, 5_139, 10_159, 10_514, 13_474, 14_214, 14_444, 17_714];
+    [5_314, 1_000, 3_000, 4_400, 4_614, 4_619, 5_138, 5_142, 10_159, 10_514, 13_474, 14_214, 14_444, 17_714];
 /// The first instant at which peripherals have their clocks, in µs, likewise.
-const CLOCKED_US: u32 = 4_610;
+const CLOCKED_US: u32 = 4_613;
 
 /// The time that the ZS9 needs to copy its interrupts' code before anything else, in µs.
 fn later_us(system: System) -> u32 {
