@@ -78,7 +78,7 @@ fn the_rotor_gets_what_is_asked_for_and_that_is_told() {
     }
 }
 
-/// Where current and voltage end it the air gap gives what there is, and the iron takes its part of that.
+/// The air gap gives what current and voltage allow at the limit, and the iron takes its part of that.
 #[test]
 fn at_the_limit_the_rotor_gets_less() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");

@@ -239,7 +239,7 @@ mod tests {
         );
     }
 
-    /// What is written twice, a place or a base, has no mutants in it.
+    /// A place or a base that is written twice has no mutants in it.
     #[test]
     fn every_mutant_that_can_be_chosen_is_written() {
         let source = "fn f(x: &mut [T], n: N) -> S { x[n - 1] /= x[n + 1]; S { a: n * 2, ..g(n % 3) } }";

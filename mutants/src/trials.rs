@@ -48,7 +48,7 @@ impl Trial {
         }
     }
 
-    /// What is drawn at random is the same each time: else a test's time, and whether it notices a mutant, were chance.
+    /// Draws at random are the same each time: else a test's time, and whether it notices a mutant, were chance.
     fn command(&self, out: &Path) -> Command {
         let mut command = Command::new(&self.program.path);
         command.env("PROPTEST_RNG_SEED", "1");

@@ -66,7 +66,8 @@ pub struct AimInput<'a> {
     pub link_scale: f32,
     /// The link's swing, where it is to be damped.
     pub swing: Option<LinkSwing>,
-    /// The share of the machine's iron loss that is made up for, 0 ..= 1: torque is then the rotor's, not the air gap's.
+    /// The share of the machine's iron loss that is made up for, 0 ..= 1: torque is then the rotor's, not the air gap's. The papers' ordinary law
+    /// knows nothing of it.
     pub iron_share: f32,
     /// The limits of the mode.
     pub limits: &'a ModeLimits,

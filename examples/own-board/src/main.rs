@@ -22,9 +22,11 @@ use tractive::modulation::SwitchLimits;
 use tractive::operator::{self, Slot, slot_s};
 use tractive::time::Instant;
 
-/// Both tasks' settings: the clock, the switches' limits, the default gains, an angle without delay.
-const SETTINGS: Settings =
-    Settings::new(CLOCK, SwitchLimits::new(MIN_PULSE_TICKS, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK));
+/// Both tasks' settings: the clock, the switches' limits, the machine's known iron loss, the default gains, an angle without delay.
+const SETTINGS: Settings = Settings {
+    iron_share: BUILT_IN.ratings.iron_share,
+    ..Settings::new(CLOCK, SwitchLimits::new(MIN_PULSE_TICKS, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK))
+};
 
 /// The tables and the settings are refused by name when this does not compile.
 const _: () = assert!(SETTINGS.check(&BUILT_IN).is_ok());

@@ -74,8 +74,7 @@ pub(super) const NO_LIMITS: ModeLimits = ModeLimits {
 /// The limits that a decided mode sets to control at a speed, for the last operating point's modulation index, so long after it, in s.
 pub(super) fn limits(
     decision: &Decision,
-    omega: f32,
-    modulation_index: f32,
+    (omega, modulation_index): (f32, f32),
     exit: &mut SixStepExit,
     settings: &Settings,
     passed_s: f32,

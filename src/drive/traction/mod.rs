@@ -50,7 +50,8 @@ pub struct Settings {
     pub current_filter_ticks: u32,
     /// The devices' drops.
     pub drops: Drops,
-    /// The share of the machine's iron loss that is made up for, 0 ..= 1.
+    /// The share of the machine's iron loss that is made up for, 0 ..= 1: [`Ratings::iron_share`](crate::machine::Ratings::iron_share), unless the
+    /// drive is told another.
     pub iron_share: f32,
 }
 

@@ -201,7 +201,7 @@ fn the_control_interrupt_is_acknowledged_and_no_other_flag() {
     assert_eq!(registers.tim3.sr().read().0, !1);
 }
 
-/// What the drive finds the angle by.
+/// Signals that the drive finds the angle by.
 #[test]
 fn the_drive_is_told_what_is_counted_and_tells_where_the_count_began() {
     let registers = Bench::started(plan()).registers;

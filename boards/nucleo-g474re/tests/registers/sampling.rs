@@ -47,7 +47,7 @@ fn zeros_are_kept_for_an_interrupt_that_begins_with_them() {
     assert_eq!(kept.kept(), zeros);
 }
 
-/// What the times of sampling and conversion are reckoned with.
+/// The clock that the times of sampling and conversion are reckoned with.
 #[test]
 fn the_converters_have_a_quarter_of_the_cores_clock() {
     let quartered = |converters: AdcCommon| converters.ccr().read().ckmode() == Ckmode::SYNC_DIV4;

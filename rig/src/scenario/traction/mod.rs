@@ -218,7 +218,7 @@ pub struct TractionOptions {
     /// The drive knows of --current-filter-us and of the mean of --adc-skew-us, as by its power stage's key, and makes up for them.
     #[arg(long)]
     pub current_filter_known: bool,
-    /// The drive knows of --iron-loss, as by its machine's key, and makes up for it; up to 100 %.
+    /// The drive knows of --iron-loss, as by its machine's key, and makes up for it, up to 100 %; --law pi does not.
     #[arg(long)]
     pub iron_loss_known: bool,
     /// The true machine, where it is not the one that control knows: a folder of tables/, or the path of any machine folder.
