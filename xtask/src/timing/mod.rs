@@ -93,7 +93,8 @@ fn identify(statistics: &statistics::Statistics) -> Result<u8> {
     for judged in &judged {
         let budget::Judged { name, value, budget } = judged;
         let verdict = if judged.kept() { "ok" } else { "OVER" };
-        println!("{name:<28} {value:>6.0} of {budget:>6}: {verdict}");
+        let value = value.ceil();
+        println!("{name:<28} {value:>6} of {budget:>6}: {verdict}");
     }
     Ok(budget::exit_code(&judged))
 }

@@ -182,7 +182,7 @@ pub fn entries(report: &Report) -> Table {
 /// The table of what has a budget, and whether it is kept.
 pub fn budgets(report: &Report) -> Table {
     let rows = report.judged.iter().map(|judged| {
-        let (value, budget) = (format!("{:.0}", judged.value), judged.budget.to_string());
+        let (value, budget) = (judged.value.ceil().to_string(), judged.budget.to_string());
         let verdict = if judged.kept() { "ok" } else { "OVER" };
         vec![judged.name.clone(), value, budget, verdict.to_owned()]
     });
