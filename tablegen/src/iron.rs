@@ -3,7 +3,7 @@
 //! `T = T_rated (ψ/ψ_rated)² (f n/n_rated + (1 − f) sign n)`: hysteresis loses the same in every turn, eddy currents the more the faster it is, both by the
 //! square of the flux linkage. The currents know nothing of it.
 
-use crate::{FluxMap, Parameters, SmoothMap};
+use crate::{FluxMap, Optimum, Parameters, SmoothMap};
 use tractive_control::machine::IronLoss;
 
 /// Speed below which hysteresis fades, electrical, in rad/s.
@@ -57,25 +57,7 @@ impl Iron {
 
 /// Square of the flux linkage at rated torque with the least current, in Wb².
 fn rated_square(parameters: &Parameters, map: &SmoothMap) -> f64 {
-    const ANGLES: u32 = 90;
-    const HALVINGS: u32 = 30;
-    let pole_pairs = f64::from(parameters.pole_pairs);
-    let gives = |id_a: f64, iq_a: f64| {
-        let at = map.at(id_a, iq_a);
-        1.5 * pole_pairs * (at.psi_d_wb * iq_a - at.psi_q_wb * id_a) >= parameters.rated_torque_nm
-    };
-    // The current in each direction that gives the torque, or the largest.
-    let in_direction = |angle: u32| {
-        let (sin, cos) = (f64::from(angle) / f64::from(ANGLES) * core::f64::consts::FRAC_PI_2).sin_cos();
-        let (mut low, mut high) = (0.0, parameters.max_current_a);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if gives(-middle * sin, middle * cos) { high = middle } else { low = middle }
-        }
-        (high, (-high * sin, high * cos))
-    };
-    let least = (0..=ANGLES).map(in_direction).min_by(|one, other| one.0.total_cmp(&other.0));
-    let (id_a, iq_a) = least.map_or((0.0, 0.0), |(_, current)| current);
+    let (id_a, iq_a) = Optimum::new(map, parameters).least_current(parameters.rated_torque_nm);
     let at = map.at(id_a, iq_a);
     at.psi_d_wb * at.psi_d_wb + at.psi_q_wb * at.psi_q_wb
 }
@@ -84,6 +66,32 @@ fn rated_square(parameters: &Parameters, map: &SmoothMap) -> f64 {
 mod tests {
     use super::*;
     use crate::MachineFolder;
+
+    #[test]
+    fn its_machine_loses_what_its_folder_names_and_the_less_the_slower_it_is() {
+        for name in ["pmasynrm-180kw", "ipm-zs9"] {
+            let folder = format!("{}/../tables/{name}", env!("CARGO_MANIFEST_DIR"));
+            let MachineFolder { parameters, map, .. } =
+                MachineFolder::read(std::path::Path::new(&folder)).unwrap();
+            let iron = Iron::of(&parameters, &map, 0.5);
+            let smooth = SmoothMap::new(&map);
+            let (id_a, iq_a) = Optimum::new(&smooth, &parameters).least_current(parameters.rated_torque_nm);
+            let square = smooth.at(id_a, iq_a).psi_d_wb.hypot(smooth.at(id_a, iq_a).psi_q_wb).powi(2);
+            let rated_rad_s = parameters.rated_speed_rpm * core::f64::consts::TAU / 60.0;
+            for (speed, share) in [
+                (1.0, 1.0),
+                (0.25, 0.25 * parameters.loss_quadratic_fraction + 1.0 - parameters.loss_quadratic_fraction),
+            ] {
+                let torque_nm =
+                    iron.torque_nm(square, speed * rated_rad_s * f64::from(parameters.pole_pairs));
+                let asked_nm = 0.5 * share * parameters.loss_rated_w / rated_rad_s;
+                assert!(
+                    (torque_nm - asked_nm).abs() <= 1e-9 * asked_nm,
+                    "{name}: {torque_nm} N·m, {asked_nm} N·m"
+                );
+            }
+        }
+    }
 
     #[test]
     fn a_drive_knows_the_same_torque() {
