@@ -2,6 +2,7 @@
 
 mod areas;
 mod build;
+mod changed;
 mod modules;
 mod report;
 mod results;
@@ -37,6 +38,9 @@ pub struct Options {
     /// Draw the sample by this number instead
     #[arg(long, value_name = "N", requires = "sample")]
     seed: Option<u64>,
+    /// Half of the sample, where there are as many, from files that the last N commits or the working tree changed
+    #[arg(long, value_name = "N", requires = "seed")]
+    changed: Option<u32>,
     /// Only the tests of these packages (may be repeated) [default: all that have any of this code]
     #[arg(long, value_name = "NAME")]
     tests: Vec<String>,

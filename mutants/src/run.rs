@@ -1,6 +1,7 @@
 //! The run: builds, learns which test comes by which mutant, and tries mutants with the tests that do, those first that cost least.
 
 use crate::build::{self, Program};
+use crate::changed;
 use crate::results::{Line, Outcome, Results};
 use crate::tree::{self, Mutant, Tree};
 use crate::trials::{self, End, Trial};
@@ -29,6 +30,9 @@ pub fn chosen<'a>(mutants: &'a [Mutant], options: &Options) -> Vec<&'a Mutant> {
     let count = sample.min(chosen.len());
     if let Some(seed) = options.seed {
         chosen.sort_by_cached_key(|mutant| drawn(seed, mutant));
+        if let Some(commits) = options.changed {
+            chosen = changed::first(chosen, &changed::files(commits), count.div_ceil(2));
+        }
         chosen.truncate(count);
     }
     let all = chosen.len();
