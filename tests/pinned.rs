@@ -195,7 +195,7 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
             sum =
                 pin(sum, &[made.carrier.alpha, made.carrier.beta, target.torque_nm, target.modulation_index]);
             sum = pin(sum, &[target.current.d, target.current.q, target.flux.d, target.flux.q]);
-            sum = pin(sum, &[target.voltage_limit_v, target.region as u8 as f32, law.map_scale()]);
+            sum = pin(sum, &[target.voltage_limit_v, target.region as u8 as f32]);
             sum = pin(sum, &[law.map_error(), law.flowing_nm(), omega, passed_s]);
         }
         if (period + 1) % (PERIODS / 8) == 0 {

@@ -140,10 +140,6 @@ impl ControlLaw for Controller {
         self.flowing_nm
     }
 
-    fn map_scale(&self) -> f32 {
-        self.map_error.scales().flux
-    }
-
     fn link_scale(&self) -> f32 {
         self.map_error.link_scale()
     }

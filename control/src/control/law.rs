@@ -71,11 +71,6 @@ pub trait ControlLaw {
         f32::NAN
     }
 
-    /// The machine's flux linkage over the map's, as far as an error of it is believed; 1 for a law that has no idea of it.
-    fn map_scale(&self) -> f32 {
-        1.0
-    }
-
     /// The link's voltage over what its sensor reads, as far as it is known: all volt-seconds are made and counted with it.
     fn link_scale(&self) -> f32 {
         1.0

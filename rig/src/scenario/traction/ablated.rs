@@ -62,10 +62,6 @@ impl ControlLaw for Ablated {
         self.controller.tracker_mut()
     }
 
-    fn map_scale(&self) -> f32 {
-        self.controller.map_scale()
-    }
-
     fn link_scale(&self) -> f32 {
         self.controller.link_scale()
     }

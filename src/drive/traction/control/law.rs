@@ -129,7 +129,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let passed_s = self.controller.passed_s(clock);
         self.limits =
             limits(&slot.key, (omega, self.modulation_index), &mut self.exit, &self.settings, passed_s);
-        let emf_v = omega.abs() * tables.ratings.magnet_flux_wb * self.controller.map_scale();
+        let emf_v = omega.abs() * tables.ratings.magnet_flux_wb;
         let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
         let demand = Demand { torque_nm, ..command.demand };
         let damps = gains.link_damping > 0.0;
