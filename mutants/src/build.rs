@@ -62,15 +62,16 @@ pub struct Program {
     pub is_test: bool,
 }
 
-/// Writes the sources and builds; the programs, and beside it the mutants left out with the error's code.
+/// Writes the sources and builds, in `tree` and `build` of a folder; the programs, and beside it the mutants left out with the error's
+/// code.
 pub fn programs(
-    to: &Path,
-    target: &Path,
+    work: &Path,
     tree: &Tree,
     packages: &[String],
     only: &BTreeSet<u32>,
     left_out: &mut BTreeMap<u32, String>,
 ) -> Result<Vec<Program>> {
+    let (to, target) = (&work.join("tree"), &work.join("build"));
     for _ in 0..BUILDS {
         let mut schemata = BTreeMap::new();
         for source in &tree.sources {

@@ -74,7 +74,7 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
         Some(_) => chosen(&tree.mutants, options),
         None => tree.mutants.iter().collect(),
     });
-    let built = build::programs(&copy, &places.work.join("build"), tree, &packages, &only, &mut left_out);
+    let built = build::programs(&places.work, tree, &packages, &only, &mut left_out);
     keep_left_out(places, tree, &left_out)?;
     let programs = built?;
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;

@@ -130,7 +130,7 @@ fn edit(source: &str, site: &Site, index: usize, numbers: &[u32], edits: &mut Ve
             editor.middle(bytes.start, bytes.start, pieces.collect());
         }
         Shape::Operator { right, own, others } => {
-            operator(&mut editor, site.left, *right, own, others, numbers)
+            operator(&mut editor, site.left..*right, own, others, numbers)
         }
         Shape::Lazy { right, and } => {
             editor.begin(&bytes, bytes.start, "(match (");
@@ -191,12 +191,12 @@ fn structure(editor: &mut Editor, base: &Bytes, fields: &[(String, bool, Bytes)]
     editor.end(&bytes, vec![plain(" })")]);
 }
 
-fn operator(editor: &mut Editor, left: usize, right: usize, own: &str, others: &[&str], numbers: &[u32]) {
+fn operator(editor: &mut Editor, sign: Bytes, own: &str, others: &[&str], numbers: &[u32]) {
     let bytes = editor.bytes.clone();
     let compares = matches!(own, "==" | "!=" | "<" | ">" | "<=" | ">=");
     let (by, a, b) = if compares { ("&", "*__a", "*__b") } else { ("", "__a", "__b") };
     editor.begin(&bytes, bytes.start, &format!("(match ({by}("));
-    editor.middle(left, right, vec![(format!("), {by}("), None)]);
+    editor.middle(sign.start, sign.end, vec![(format!("), {by}("), None)]);
     let mut pieces = vec![plain(")) { (__a, __b) => ")];
     pieces.extend(branches(
         numbers,

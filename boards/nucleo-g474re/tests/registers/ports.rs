@@ -272,10 +272,10 @@ fn the_watchdog_is_fed_only_when_both_interrupts_ran() {
     }
 }
 
-/// An encoder whose index is at count 0, turning by `step` counts a control period from `from` on.
-fn turn(encoder: &mut Encoder, registers: &Registers, from: i32, step: i32, periods: i32, slip: i32) {
+/// An encoder whose index is at count 0, turning by `step` counts a control period from `from` on, 2,500 counts in all.
+fn turn(encoder: &mut Encoder, registers: &Registers, from: i32, step: i32, slip: i32) {
     let (mut before, mut right) = (from, false);
-    for period in 1..=periods {
+    for period in 1..=2_500 / step.abs() {
         let now = from + period * step;
         let passed = now.div_euclid(4_096) != before.div_euclid(4_096);
         // The index sets the count right, whatever was lost until then.
@@ -311,7 +311,7 @@ fn an_index_must_find_the_count_where_it_is_expected() {
         assert_eq!(encoder.angle(), None, "its count may be older than the index");
         assert!(!registers.tim4.sr().read().idxif(), "acknowledged");
         assert!(encoder.angle().is_some());
-        turn(&mut encoder, &registers, 2_000, step, 2_500 / step.abs(), slip);
+        turn(&mut encoder, &registers, 2_000, step, slip);
         assert_eq!(encoder.is_lost(), lost, "{step} {slip}");
     }
 }
