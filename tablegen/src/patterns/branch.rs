@@ -85,14 +85,15 @@ impl Branch {
         let lost = |at: u32| format!("{}: no optimum at modulation index {:.2}", self.name, index(at));
         let start = self.best_at_anchor().ok_or_else(|| lost(self.anchor))?;
         let bounds = self.bounds(&start).ok_or_else(|| lost(self.anchor))?;
-        let torque = TorqueRipple::new();
+        let ripple = TorqueRipple::new();
+        let torque = |wave: &Waveform| ripple.squared(wave);
         let follow = |steps: &mut dyn Iterator<Item = u32>| {
             let mut last = start.clone();
             let mut nodes = Vec::new();
             for at in steps {
                 let problem = self.problem(at, &bounds);
                 last = problem.optimum(&last).ok_or_else(|| lost(at))?;
-                let calmer = Problem { torque: Some(&torque), ..problem }.calmest(&last);
+                let calmer = Problem { beside: Some(&torque), ..problem }.calmest(&last);
                 let calmer = calmer.ok_or_else(|| lost(at))?;
                 nodes.push((index(at), calmer));
             }
@@ -111,7 +112,7 @@ impl Branch {
             index: index(at),
             shortest_rad: self.shortest_rad(),
             bounds,
-            torque: None,
+            beside: None,
         }
     }
 
@@ -157,5 +158,7 @@ fn spread(start: u32, count: usize) -> Vec<f64> {
     angles
 }
 
+#[cfg(test)]
+mod second_axis;
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,5 @@
 //! The local optimum from a start: sequential quadratic programming, by the crate `slsqp`.
 
-use super::torque::TorqueRipple;
 use super::waveform::Waveform;
 use slsqp::{Func, StopTols, minimize};
 
@@ -23,23 +22,23 @@ pub(super) struct Problem<'a> {
     pub shortest_rad: f64,
     /// Least and largest value of each angle, in rad.
     pub bounds: &'a [(f64, f64)],
-    /// The torque ripple that counts as much as the distortion, if it counts.
-    pub torque: Option<&'a TorqueRipple>,
+    /// What counts beside the square of the distortion, if anything does.
+    pub beside: Option<&'a dyn Fn(&Waveform) -> f64>,
 }
 
-/// Step of an angle by which the torque ripple's slope is found, in rad.
+/// Step of an angle by which the slope of what counts beside it is found, in rad.
 const SLOPE_STEP: f64 = 1e-6;
 
 /// By how much a start beside another problem's optimum is off it in each angle, in rad.
 const BESIDE: f64 = 0.01;
 
 impl Problem<'_> {
-    /// The optimum that is reached from that of the problem without torque ripple. Right there the search often ends at once, so it begins
+    /// The optimum that is reached from that of the distortion alone. Right there the search often ends at once, so it begins
     /// beside it, too: the better one counts.
     pub fn calmest(&self, start: &[f64]) -> Option<Vec<f64>> {
         let cost = |angles: &Vec<f64>| {
             let wave = Waveform { first: self.first, angles_rad: angles };
-            wave.ripple(None) + self.torque.map_or(0.0, |torque| torque.squared(&wave))
+            wave.ripple(None) + self.beside.map_or(0.0, |beside| beside(&wave))
         };
         let starts = [0.0, BESIDE].map(|off| start.iter().map(|angle| angle + off).collect::<Vec<_>>());
         let found = starts.iter().filter_map(|start| self.optimum(start));
@@ -52,13 +51,13 @@ impl Problem<'_> {
         let cost = |angles: &[f64], mut slopes: Option<&mut [f64]>, (): &mut ()| {
             let wave = Waveform { first, angles_rad: angles };
             let mut value = wave.ripple(slopes.as_deref_mut());
-            if let Some(torque) = self.torque {
-                let own = torque.squared(&wave);
+            if let Some(beside) = self.beside {
+                let own = beside(&wave);
                 value += own;
                 for (k, slope) in slopes.iter_mut().flat_map(|slopes| slopes.iter_mut()).enumerate() {
                     let mut moved = angles.to_vec();
                     moved[k] += SLOPE_STEP;
-                    *slope += (torque.squared(&Waveform { first, angles_rad: &moved }) - own) / SLOPE_STEP;
+                    *slope += (beside(&Waveform { first, angles_rad: &moved }) - own) / SLOPE_STEP;
                 }
             }
             slopes.into_iter().flatten().for_each(|slope| *slope *= SCALE);

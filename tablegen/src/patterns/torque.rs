@@ -23,7 +23,12 @@ pub(super) struct TorqueRipple {
 impl TorqueRipple {
     /// In the reference machine's direction.
     pub(super) fn new() -> Self {
-        let direction = AHEAD_RAD - FRAC_PI_2;
+        Self::ahead(AHEAD_RAD)
+    }
+
+    /// In a direction ahead of the fundamental's voltage, in rad.
+    pub(super) fn ahead(ahead_rad: f64) -> Self {
+        let direction = ahead_rad - FRAC_PI_2;
         let (across, along) = (libm::cos(direction), libm::sin(direction));
         let wave = |k: usize, instant: usize| {
             let angle = 6.0 * k as f64 * FRAC_PI_3 * instant as f64 / INSTANTS as f64;

@@ -52,7 +52,7 @@ fn a_branchs_problem_is_its_own() {
         assert_eq!((problem.first, branch.first()), (first, first));
         assert!((problem.index - 0.85).abs() < 1e-12);
         assert_eq!(problem.shortest_rad, branch.shortest_rad());
-        assert!(problem.torque.is_none() && problem.bounds == bounds);
+        assert!(problem.beside.is_none() && problem.bounds == bounds);
     }
 }
 

@@ -1,11 +1,12 @@
 //! Constraints by finite differences, exactness, and optima of two angles beside a search along the line that the fundamental leaves.
 
+use super::super::torque::TorqueRipple;
 use super::*;
 
 const BOUNDS: [(f64, f64); 2] = [(0.02, 1.56), (0.02, 1.56)];
 
 fn problem(first: f64, index: f64) -> Problem<'static> {
-    Problem { first, index, shortest_rad: 0.05, bounds: &BOUNDS, torque: None }
+    Problem { first, index, shortest_rad: 0.05, bounds: &BOUNDS, beside: None }
 }
 
 fn fundamental(first: f64, angles_rad: &[f64]) -> f64 {
@@ -63,7 +64,7 @@ fn exact_angles_keep_their_bounds() {
     let angles = [0.4, 1.1];
     let made = |bounds: [(f64, f64); 2], shortest_rad: f64| {
         let index = fundamental(1.0, &angles);
-        let problem = Problem { first: 1.0, index, shortest_rad, bounds: &bounds, torque: None };
+        let problem = Problem { first: 1.0, index, shortest_rad, bounds: &bounds, beside: None };
         problem.made_exact(angles.to_vec()).is_some()
     };
     for (by, good) in [(-1e-2, true), (0.8e-4, true), (1.2e-4, false), (1e-2, false)] {
@@ -91,14 +92,15 @@ fn by_search(first: f64, index: f64, start: f64, cost: &dyn Fn(&[f64]) -> f64) -
 
 #[test]
 fn optima_of_two_angles() {
-    let torque = TorqueRipple::new();
+    let ripple = TorqueRipple::new();
+    let torque = |wave: &Waveform| ripple.squared(wave);
     for (first, index, start) in [(1.0, 0.6, [0.5, 0.9]), (-1.0, 0.85, [0.17, 1.45])] {
-        for ripple in [None, Some(&torque)] {
+        for beside in [None, Some(&torque as &dyn Fn(&Waveform) -> f64)] {
             let cost = |angles_rad: &[f64]| {
                 let wave = Waveform { first, angles_rad };
-                wave.ripple(None) + ripple.map_or(0.0, |torque| torque.squared(&wave))
+                wave.ripple(None) + beside.map_or(0.0, |beside| beside(&wave))
             };
-            let problem = Problem { torque: ripple, ..problem(first, index) };
+            let problem = Problem { beside, ..problem(first, index) };
             let Some(found) = problem.optimum(&start) else { panic!("{first} {index}") };
             assert!((fundamental(first, &found) - index).abs() < 1e-14);
             let best = by_search(first, index, found[0], &cost);
@@ -111,16 +113,17 @@ fn optima_of_two_angles() {
 /// From both starts, the one that costs less.
 #[test]
 fn the_calmest_is_the_better_of_two() {
-    let torque = TorqueRipple::new();
+    let ripple = TorqueRipple::new();
+    let torque = |wave: &Waveform| ripple.squared(wave);
     let bounds = [(0.02, 1.5); 3];
     let mut other = 0;
     for k in 0..24 {
         let index = 0.5 + 0.02 * f64::from(k);
         let first = if k % 2 == 0 { 1.0 } else { -1.0 };
-        let problem = Problem { first, index, shortest_rad: 0.03, bounds: &bounds, torque: Some(&torque) };
+        let problem = Problem { first, index, shortest_rad: 0.03, bounds: &bounds, beside: Some(&torque) };
         let cost = |angles_rad: &Vec<f64>| {
             let wave = Waveform { first, angles_rad };
-            (wave.ripple(None), torque.squared(&wave))
+            (wave.ripple(None), torque(&wave))
         };
         let start = [0.3, 0.6, 0.9];
         let found = [0.0, 0.01].map(|by| problem.optimum(&start.map(|angle| angle + by)));
