@@ -82,6 +82,17 @@ fn the_line_s_limit_does_not_wait_for_jerk() {
     assert!(over < 1.005, "{over}");
 }
 
+/// Copper loss of three pulses' ripple is much of the line's power where little torque is left: by the references' loss alone it was 1.019.
+#[test]
+fn the_ripple_s_loss_is_part_of_the_line_s_power() {
+    let chosen = catalogue::of_traction("line-limits --line-current 30 --line-power 40").unwrap();
+    let machine = chosen.machine().unwrap();
+    let recording = chosen.drive(&machine).unwrap();
+    let figures = chosen.figures(&recording, &machine);
+    let over = ["line_current_over_limit", "line_power_over_limit"].map(|name| figures.number(name).unwrap());
+    assert!(over[0] < 1.017 && over[1] < 1.02, "{over:?}");
+}
+
 /// Without the limit the wheel runs away, 20 % in 0.1 s, and the run says so; with it torque is reduced and comes back.
 #[test]
 fn a_wheel_that_loses_its_grip_is_caught() {

@@ -1,12 +1,14 @@
 //! The torque that limits of line current and line power leave.
 //!
-//! The line's power is the shaft's and the copper loss: `P = ω T + k T²`, with `k` from the present currents, `1.5 R (i_d² + i_q²)/T²`. Solved for the
+//! The line's power is the shaft's and the copper loss: `P = ω T + k T²`, with `k` from the currents that flow, the pulses' ripple included: at a sixth of
+//! the largest torque that of three pulses a turn is nearly as much again. Solved for the
 //! torque, so that no loop closes over the loss; at the limit, where it counts, `k T²` is the loss itself. Inverter, iron and auxiliaries are not in it.
 
 use super::{Settings, TrainLimits};
 use crate::frames::{limit, sqrt};
 use crate::machine::Ratings;
 use crate::ports::Report;
+use crate::thermal::copper_w;
 
 /// Time constant of the link voltage and of the loss, in s: slower than the swing of a usual line filter, which is not the line's.
 const SMOOTH_S: f32 = 0.05;
@@ -42,11 +44,10 @@ impl Drawn {
     #[inline(never)]
     pub(super) fn step(&mut self, report: &Report, settings: &Settings) {
         let Settings { ratings, slot_s, .. } = *settings;
-        let Report { udc_v, torque_nm, id_a, iq_a, omega, .. } = *report;
+        let Report { udc_v, torque_nm, current_a, omega, .. } = *report;
         let least_nm = LEAST_SHARE * ratings.max_torque_nm;
         let torque_nm = if torque_nm.abs() > least_nm { torque_nm } else { least_nm };
-        let copper_w = 1.5 * ratings.stator_resistance_ohm * (id_a * id_a + iq_a * iq_a);
-        let loss = copper_w / (torque_nm * torque_nm);
+        let loss = copper_w(current_a, ratings.stator_resistance_ohm) / (torque_nm * torque_nm);
         let share = if self.udc_v > 0.0 { slot_s / (slot_s + SMOOTH_S) } else { 1.0 };
         self.udc_v += share * (udc_v - self.udc_v);
         self.loss += share * (loss - self.loss);
@@ -163,15 +164,14 @@ mod tests {
     fn the_line_and_the_loss_are_smoothed() {
         let ratings = &BUILT_IN.ratings;
         let settings = Settings::rated(ratings, 1e-3, None);
-        let report = |udc_v: f32, torque_nm: f32, id_a: f32, iq_a: f32| Report {
+        let report = |udc_v: f32, torque_nm: f32, current_a: f32| Report {
             udc_v,
             torque_nm,
-            id_a,
-            iq_a,
+            current_a,
             ..Report::default()
         };
-        let loss = |square_a: f32, torque_nm: f32| {
-            1.5 * ratings.stator_resistance_ohm * square_a / (torque_nm * torque_nm)
+        let loss = |current_a: f32, torque_nm: f32| {
+            copper_w(current_a, ratings.stator_resistance_ohm) / (torque_nm * torque_nm)
         };
         let least_nm = 0.1 * ratings.max_torque_nm;
         for (torque_nm, counted_nm) in [
@@ -182,11 +182,11 @@ mod tests {
             (0.0, least_nm),
         ] {
             let mut drawn = Drawn::UNKNOWN;
-            drawn.step(&report(1_500.0, torque_nm, -30.0, 40.0), &settings);
+            drawn.step(&report(1_500.0, torque_nm, 50.0), &settings);
             assert_eq!(drawn.udc_v, 1_500.0);
-            assert!((drawn.loss / loss(2_500.0, counted_nm) - 1.0).abs() < 1e-5, "{torque_nm}: {drawn:?}");
+            assert!((drawn.loss / loss(50.0, counted_nm) - 1.0).abs() < 1e-5, "{torque_nm}: {drawn:?}");
             let before = drawn;
-            drawn.step(&report(1_449.0, torque_nm, 0.0, 0.0), &settings);
+            drawn.step(&report(1_449.0, torque_nm, 0.0), &settings);
             assert!((drawn.udc_v - 1_499.0).abs() < 1e-2, "{drawn:?}");
             assert!((drawn.loss / before.loss - 50.0 / 51.0).abs() < 1e-5, "{drawn:?}");
         }
@@ -257,10 +257,10 @@ mod tests {
         let settings = Settings::rated(&BUILT_IN.ratings, 1e-3, None);
         let ratings = settings.ratings;
         let report = |udc_v, torque_nm, mechanical: f32| {
-            let (id_a, iq_a, omega) = (-30.0, 40.0, mechanical * ratings.pole_pairs);
-            Report { udc_v, torque_nm, id_a, iq_a, omega, ..Report::default() }
+            let (current_a, omega) = (50.0, mechanical * ratings.pole_pairs);
+            Report { udc_v, torque_nm, current_a, omega, ..Report::default() }
         };
-        let copper_w = 1.5 * ratings.stator_resistance_ohm * 2_500.0;
+        let copper_w = copper_w(50.0, ratings.stator_resistance_ohm);
         let near = |got: f32, wanted: f32| assert!((got / wanted - 1.0).abs() < 1e-5, "{got}, not {wanted}");
         let mut drawn = Drawn::UNKNOWN;
         drawn.step(&report(1_500.0, 400.0, 50.0), &settings);

@@ -14,6 +14,7 @@ mod sensor;
 
 pub use derate::Derating;
 pub use magnet::Magnets;
+pub(crate) use model::copper_w;
 pub use model::{DeviceLosses, Rise, copper_factor};
 pub use sensor::{Element, Sensor};
 
@@ -164,7 +165,7 @@ impl ThermalState {
             return None;
         };
         let ohm = thermal.resistance_ohm * copper_factor(sensor_c + self.winding.kelvin());
-        let winding_k = self.winding.step(model::copper_w(load.current_a, ohm), &thermal.winding, slot_s);
+        let winding_k = self.winding.step(copper_w(load.current_a, ohm), &thermal.winding, slot_s);
         let device_w = thermal.losses.watts(load.current_a, load.udc_v);
         let junction_k = self.junction.step(device_w, &thermal.junction, slot_s);
         let (winding_c, junction_c) = (sensor_c + winding_k, heat_sink_c + junction_k);

@@ -43,7 +43,7 @@ const LARGEST: f32 = 0.913_5;
 
 /// Copper loss of three phases, in W, by their largest current in A: right on average of a machine that turns, at a standstill up to a tenth too
 /// much.
-pub(super) fn copper_w(current_a: f32, ohm: f32) -> f32 {
+pub(crate) fn copper_w(current_a: f32, ohm: f32) -> f32 {
     1.5 / LARGEST * ohm * current_a * current_a
 }
 
