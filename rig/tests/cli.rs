@@ -283,6 +283,10 @@ fn points_come_back_with_their_regions() {
         ("torque_nm,speed_rpm,udc_v\n1,2,3\n1,nan,3\n", [":3:", "speed_rpm"]),
         ("torque_nm,speed_rpm,udc_v\n1,2,0\n", [":2:", "udc_v"]),
         ("torque_nm,speed_rpm,udc_v\n1,x,3\n", [":2:", "must be"]),
+        (
+            "torque_nm,speed_rpm,udc_v\n9,6000,1500\n9,1e6,1500\n",
+            [":3: speed_rpm: 1e6", "no more voltage than 1500 V"],
+        ),
     ] {
         std::fs::write(&input, bad).unwrap();
         refused_in_one_line(&line, &words);
