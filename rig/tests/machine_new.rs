@@ -113,3 +113,19 @@ fn a_folder_is_made_whole_replaced_whole_and_others_are_left_alone() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("holds notes.txt"), "{refused:?}");
     assert!(out.join("notes.txt").exists());
 }
+
+/// Inductances in mH make a machine whose full torque ends at a thousandth of its speed: that is told.
+#[test]
+fn values_in_other_units_are_asked_about() {
+    let folder = tempfile::tempdir().unwrap();
+    for (options, asked) in [(GOOD.to_owned(), false), (with("--lq", "0.45"), true)] {
+        let output = new(&options, &folder.path().join("made"));
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(
+            said.contains("of the largest speed: are inductances in H, flux linkages in Wb?"),
+            asked,
+            "{said}"
+        );
+    }
+}
