@@ -1,7 +1,8 @@
 //! A machine folder written whole or not at all.
 
+use crate::files::check_folder;
 use crate::platform::written_folder;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use tractive_tablegen::{FluxMap, MachineFolder};
@@ -37,11 +38,14 @@ pub fn folder(out: &Path, contents: &Contents) -> Result<()> {
 }
 
 /// The place is free, or an empty folder, or, which is `true`, a machine folder.
-fn check_place(out: &Path) -> Result<bool> {
+///
+/// # Errors
+/// Where anything else is there, or a file in its way.
+pub fn check_place(out: &Path) -> Result<bool> {
+    check_folder(out)?;
     if !out.exists() {
         return Ok(false);
     }
-    ensure!(out.is_dir(), "--out {}: must be a folder, or nothing yet", out.display());
     let entries = std::fs::read_dir(out).and_then(|entries| {
         entries.map(|entry| Ok(PathBuf::from(entry?.file_name()))).collect::<std::io::Result<Vec<_>>>()
     });
