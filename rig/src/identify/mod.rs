@@ -27,7 +27,7 @@ pub use turn::Rotor;
 
 use crate::can;
 use crate::files::write_text;
-use crate::folder::{Contents, check_place, csv, write_folder};
+use crate::folder::{Contents, check_place, csv, usual_page, write_folder};
 use crate::machine::Machine;
 use crate::options::{not_negative, positive};
 use crate::report::{self, Page};
@@ -86,10 +86,7 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
         }
     };
     write_folder(out, &contents(&outcome, &machine))?;
-    let page = match &identify.page {
-        Some(page) => page.clone(),
-        None => PathBuf::from(format!("target/tractive/identify-{}.html", machine.tables.name)),
-    };
+    let page = identify.page.clone().unwrap_or_else(|| usual_page("identify", machine.tables.name));
     write_page(&outcome, &machine, &page)?;
     if identify.options.json {
         crate::say!("{}", serde_json::to_string(outcome.figures().values())?);

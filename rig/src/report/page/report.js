@@ -293,7 +293,7 @@
     series(panel, { name, ink, style }, curve) {
       const dashed = style === "dashed";
       return {
-        label: name, stroke: css(ink), spanGaps: true, points: { show: false },
+        label: name, stroke: css(ink), spanGaps: true, points: { show: u => u.data[0].length === 1 },
         width: style === "ripple" ? 1 : dashed ? 1.6 : 1.4, dash: dashed ? [6, 4] : undefined,
         // The value itself, not what stands for it where many are drawn as one.
         value: (u, y, s, k) => (y == null ? "" : panel.levels.length ? panel.levels[Math.round(y)] ?? "" : String(+curve.at(u.data[0][k]).toPrecision(5))),
