@@ -19,6 +19,7 @@
 //! | `defmt` | `defmt::Format` for what a firmware logs: measurements, reports, faults, states, requests, frames |
 //! | `authentication` | the module `protocol::authentication`: commands that only the holder of a key can send |
 //! | `built-in` | the module `built_in`: the tables of the machines that `TRACTIVE_MACHINE` and `TRACTIVE_ZS9_MACHINE` name |
+//! | `optimal` | the optimised pulse patterns: their modes and angles |
 //! | `wire` | the module `wire`: the words between an emulated board and the rig |
 //! | `qemu` | what the reference images on QEMU's board need; with the two above |
 //!

@@ -17,6 +17,7 @@
 //! | feature | what it brings |
 //! |---|---|
 //! | `defmt` | `defmt::Format` for measurements, voltages, pulses, operating points and errors |
+//! | `optimal` | the optimised pulse patterns: their modes and angles |
 //!
 //! # Conventions
 //! * Pure steps: `step(&input, &mut state) -> output`; no clock, no peripheral, no global inside.

@@ -1,7 +1,7 @@
 //! Files that are written whole or not at all.
 
 use crate::platform::written;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use serde::ser::{SerializeStruct, Serializer};
 use std::io::{BufWriter, Write};
@@ -134,6 +134,20 @@ pub fn write_whole(
         fill(&mut out)?;
         Ok(out.flush()?)
     })
+}
+
+/// Refuses an `--out` where a file is in the way of a folder.
+pub fn check_folder(out: &Path) -> Result<()> {
+    let in_the_way = out.ancestors().find(|path| path.exists() && !path.is_dir());
+    in_the_way.map_or(Ok(()), |file| {
+        bail!("--out {}: {} is a file: must be a folder, or nothing yet", out.display(), file.display())
+    })
+}
+
+/// Makes the folder of `--out`, where it is not there yet.
+pub fn make_folder(out: &Path) -> Result<()> {
+    check_folder(out)?;
+    std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))
 }
 
 /// Writes a text file whole or not at all.

@@ -1,6 +1,6 @@
 //! `cargo rig figures`: the figures of both papers, each as this project makes it.
 
-use crate::files::write_text;
+use crate::files::{make_folder, write_text};
 use crate::machine::Machine;
 use crate::options::positive;
 use crate::pictures::architecture::architecture;
@@ -290,7 +290,7 @@ pub fn run(options: &FigureOptions) -> Result<()> {
     if options.list {
         return tell(options, &pictures, |_| Vec::new());
     }
-    std::fs::create_dir_all(&options.out).with_context(|| format!("--out {}", options.out.display()))?;
+    make_folder(&options.out)?;
     let machines = Machines::load()?;
     let bar = bar(pictures.len() as u64, "figures [{bar:40}] {pos}/{len} {elapsed}");
     jobs(&pictures).par_iter().try_for_each(|job| {

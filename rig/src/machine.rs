@@ -97,7 +97,7 @@ fn find(name_or_path: &str) -> Result<PathBuf> {
     let candidates = [PathBuf::from(name_or_path), tables.join(name_or_path)];
     match candidates.iter().find(|path| path.is_dir()) {
         Some(path) => Ok(path.clone()),
-        None => bail!("--machine {name_or_path}: must be a folder, or the name of one in tables/"),
+        None => bail!("machine {name_or_path}: must be a folder, or the name of one in tables/"),
     }
 }
 

@@ -1,9 +1,10 @@
 //! `cargo rig merge`: the whole of a campaign in shards.
 
 use crate::campaign::{command, healthy, random};
+use crate::files::make_folder;
 use crate::points;
 use crate::shards;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -26,7 +27,7 @@ pub struct MergeOptions {
 pub fn run(options: &MergeOptions) -> Result<ExitCode> {
     let merged = shards::merge(&options.folders)?;
     let out = &options.out;
-    std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
+    make_folder(out)?;
     let good = match merged.plan.campaign.as_str() {
         command::FAULTS => command::merged(&merged, out, options.json)?,
         healthy::command::HEALTHY => healthy::command::merged(&merged, out, options.json)?,

@@ -7,7 +7,7 @@ use crate::shards::{self, Merged, Plan, Shard};
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 use std::path::Path;
-use tractive::control::{VoltageLimit, operating_point};
+use tractive::control::{OperatingPoint, VoltageLimit, flux_linkage, operating_point};
 
 const COLUMNS: [&str; 3] = ["torque_nm", "speed_rpm", "udc_v"];
 
@@ -18,12 +18,15 @@ struct Wanted {
     udc_v: f64,
 }
 
+/// Current or voltage over its limit up to which that is kept: what interpolation adds is far below.
+const KEPT: f32 = 1.005;
+
 /// The name of a sweep in shards.
 pub const POINTS: &str = "points";
 
 /// Reads points, writes points with `id_a,iq_a,region`; of a shard its own ones, into a folder.
 pub fn run(input: &Path, output: &Path, machine: &Machine, shard: Option<Shard>) -> Result<()> {
-    let wanted = read(input)?;
+    let wanted = read(input, machine)?;
     let columns = format!("{},id_a,iq_a,region", COLUMNS.join(","));
     if let Some(shard) = shard {
         let folder = format!("{:?} {:?}", machine.folder.parameters, machine.folder.map);
@@ -44,23 +47,49 @@ pub fn merged(merged: &Merged, out: &Path) -> Result<()> {
     files::write_text(&out.join("points.csv"), &merged.csv())
 }
 
+impl Wanted {
+    /// Electrical angular speed, in rad/s.
+    fn omega(&self, machine: &Machine) -> f32 {
+        (self.speed_rpm * core::f64::consts::TAU / 60.0) as f32 * machine.tables.ratings.pole_pairs
+    }
+
+    fn found(&self, machine: &Machine) -> OperatingPoint {
+        let limit = VoltageLimit { udc_v: self.udc_v as f32, modulation_index: 1.0, filled: false };
+        operating_point(self.torque_nm as f32, self.omega(machine), &limit, machine.tables)
+    }
+
+    /// `true` if what is found keeps both limits: at some speed, of some link, no current within the largest one does.
+    fn is_kept(&self, machine: &Machine) -> bool {
+        let (current, omega) = (self.found(machine).current, self.omega(machine));
+        let flux = flux_linkage(machine.tables, current);
+        let rs = machine.tables.ratings.stator_resistance_ohm;
+        let voltage_v = (rs * current.d - omega * flux.q).hypot(rs * current.q + omega * flux.d);
+        let most_v = core::f32::consts::FRAC_2_PI * self.udc_v as f32;
+        current.length() <= KEPT * machine.tables.ratings.max_current_a && voltage_v <= KEPT * most_v
+    }
+}
+
 fn line(point: &Wanted, machine: &Machine) -> String {
     let Wanted { torque_nm, speed_rpm, udc_v } = *point;
-    let omega = (speed_rpm * core::f64::consts::TAU / 60.0) as f32 * machine.tables.ratings.pole_pairs;
-    let limit = VoltageLimit { udc_v: udc_v as f32, modulation_index: 1.0, filled: false };
-    let found = operating_point(torque_nm as f32, omega, &limit, machine.tables);
+    let found = point.found(machine);
     let region = found.region.name();
     format!("{torque_nm},{speed_rpm},{udc_v},{},{},{region}", found.current.d, found.current.q)
 }
 
-fn read(input: &Path) -> Result<Vec<Wanted>> {
+fn read(input: &Path, machine: &Machine) -> Result<Vec<Wanted>> {
     let columns = Columns::read(input, COLUMNS)?;
     let points = columns.rows().map(|[torque, speed, udc]| {
-        Ok(Wanted {
+        let wanted = Wanted {
             torque_nm: torque.number("a finite number", |_| true)?,
             speed_rpm: speed.number("a finite number", |_| true)?,
             udc_v: udc.number("a finite number above 0", |volts| volts > 0.0)?,
-        })
+        };
+        let most_a = machine.tables.ratings.max_current_a;
+        let allowed = format!(
+            "a speed at which some current within {most_a} A needs no more voltage than {} V of link give",
+            wanted.udc_v
+        );
+        if wanted.is_kept(machine) { Ok(wanted) } else { Err(speed.wrong(&allowed)) }
     });
     points.collect()
 }

@@ -82,10 +82,55 @@ fn bad_usage_is_refused() {
         ("--f1 1e-9", "--f1 0.000000001"),
         ("--f1 1e5", "--f1 100000"),
         ("--f1 100 --dead-time-us 1e6", "dead_time_ticks: 25000000"),
+        ("--f1 100 --min-pulse-us 1e6", "(--min-pulse-us), 25 a µs"),
     ] {
         refused_in_one_line(&format!("pattern --mode mid7 --u 1 --udc 2 {bad} --out x"), &[word, "must be"]);
     }
     refused("pattern --mode mid9 --u 1 --udc 2 --f1 3 --out x", &["mid9"]);
+}
+
+/// A file that stands where the files are to go is told before anything has run.
+#[test]
+fn a_place_that_is_taken_is_refused_before_anything_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "mine").unwrap();
+    for command in [
+        "run sweep",
+        "campaign",
+        "campaign --random 1000",
+        "campaign --random 9 --shard 0/3",
+        "compare",
+        "figures",
+        "identify",
+    ] {
+        for out in [file.clone(), file.join("deeper")] {
+            let line = format!("{command} --out {}", out.display());
+            refused_in_one_line(
+                &line,
+                &[&format!("{} is a file: must be a folder, or nothing yet", file.display())],
+            );
+        }
+    }
+    refused_in_one_line("campaign --random 0", &["--random 0: must be at least 1"]);
+    let (file, place) = (file.display(), folder.path().display());
+    refused_in_one_line(
+        &format!("machine show pmsm-48v-1kw --out {place}"),
+        &["is a folder: must be a file"],
+    );
+    refused_in_one_line(&format!("dbc --out {place}/no/x.dbc"), &[&format!("there is no folder {place}/no")]);
+    assert_eq!(std::fs::read_to_string(format!("{file}")).unwrap(), "mine");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+/// A run of the second system has no overview: that of a run before it does not stay.
+#[test]
+fn no_picture_of_another_run_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("overview.svg");
+    std::fs::write(&picture, "of another run").unwrap();
+    rig(&format!("run zs9-steady --out {}", folder.path().display()));
+    assert!(folder.path().join("report.html").exists() && !picture.exists());
 }
 
 /// A folder of which a file never ends.
@@ -283,6 +328,10 @@ fn points_come_back_with_their_regions() {
         ("torque_nm,speed_rpm,udc_v\n1,2,3\n1,nan,3\n", [":3:", "speed_rpm"]),
         ("torque_nm,speed_rpm,udc_v\n1,2,0\n", [":2:", "udc_v"]),
         ("torque_nm,speed_rpm,udc_v\n1,x,3\n", [":2:", "must be"]),
+        (
+            "torque_nm,speed_rpm,udc_v\n9,6000,1500\n9,1e6,1500\n",
+            [":3: speed_rpm: 1e6", "no more voltage than 1500 V"],
+        ),
     ] {
         std::fs::write(&input, bad).unwrap();
         refused_in_one_line(&line, &words);

@@ -171,6 +171,19 @@ fn what_is_wrong_with_a_map_is_named_with_file_line_and_column() {
         (good.clone(), "--negate psi_q", "must rise with iq, above"),
         (good.clone(), "--negate id_a", "'--negate"),
         (good.clone(), "--flux-factor 0", "--flux-factor 0: must be above 0"),
+        (
+            line(7, "-22,10,0,1,0,2"),
+            "",
+            "map.csv:7: 6 cells: must be 4 as in the head; with decimal commas, semicolons",
+        ),
+        (String::new(), "", "map.csv: is empty"),
+        (
+            map("id_a,iq_a,psi_d,psi_q", &axis(0.0, 2.0, 14), &q, |id, iq| {
+                format!("{id},{iq},{},{}", 0.1 + 0.002 * id, 0.01 * iq)
+            }),
+            "",
+            "map.csv: id: begins at 0: must go below 0",
+        ),
         (good.replace("id_a,", "id_ma,"), "", "--max-current 20: must be at most 0.022"),
     ] {
         std::fs::write(&file, text).unwrap();

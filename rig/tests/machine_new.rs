@@ -90,6 +90,17 @@ fn a_machine_of_round_numbers_is_taken() {
     }
 }
 
+/// A link with fifty times the voltage that the largest speed needs: no drive takes such tables, so no folder is made.
+#[test]
+fn what_the_drive_would_refuse_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = new(&with("--max-speed-rpm", "60"), &folder.path().join("made"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("the drive refuses the tables of these values: weakening.flux_knee_wb"), "{said}");
+    assert_eq!((said.trim().lines().count(), std::fs::read_dir(folder.path()).unwrap().count()), (1, 0));
+}
+
 #[test]
 fn a_folder_is_made_whole_replaced_whole_and_others_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -112,4 +123,17 @@ fn a_folder_is_made_whole_replaced_whole_and_others_are_left_alone() {
     assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("holds notes.txt"), "{refused:?}");
     assert!(out.join("notes.txt").exists());
+}
+
+/// Inductances in other units make a machine whose full torque ends at a hundredth of its speed: that is told, or the drive refuses it.
+#[test]
+fn values_in_other_units_are_asked_about() {
+    let folder = tempfile::tempdir().unwrap();
+    for (lq_h, code, asked) in [("0.45e-3", 0, false), ("0.03", 0, true), ("0.45", 2, true)] {
+        let output = new(&with("--lq", lq_h), &folder.path().join("made"));
+        let said = [output.stdout, output.stderr].concat();
+        let said = String::from_utf8_lossy(&said);
+        assert_eq!(output.status.code(), Some(code), "{lq_h}: {said}");
+        assert_eq!(said.contains("are inductances in H, flux linkages in Wb?"), asked, "{lq_h}: {said}");
+    }
 }

@@ -29,7 +29,9 @@ const SETTINGS: Settings = Settings {
 };
 
 /// The tables and the settings are refused by name when this does not compile.
-const _: () = assert!(SETTINGS.check(&BUILT_IN).is_ok());
+const _: () = if let Err(refused) = SETTINGS.check(&BUILT_IN) {
+    panic!("{}", refused.name)
+};
 
 static SHARED: Shared = Shared::new();
 

@@ -4,6 +4,7 @@ use super::judge::Verdict;
 use super::options::CampaignOptions;
 use super::{Campaign, Case, Outcome, healthy, random, report};
 use crate::ablation::Ablation;
+use crate::files::make_folder;
 use crate::run::bar;
 use crate::shards::{self, Merged, Plan};
 use anyhow::{Context, Result, bail};
@@ -39,6 +40,7 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
         shards::run(&plan, shard, &options.out, row)?;
         return Ok(ExitCode::SUCCESS);
     }
+    make_folder(&options.out)?;
     let bar = bar(cases.len() as u64, "campaign [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
     let outcomes = campaign.run_all(&cases, || bar.inc(1))?;
     bar.finish_and_clear();
@@ -69,7 +71,6 @@ fn cases(options: &CampaignOptions) -> Result<Vec<Case>> {
 
 /// Writes and prints what came of the cases; `true` if none is uncaught.
 fn finish(outcomes: &[Outcome], given: serde_json::Value, out: &Path, json: bool) -> Result<bool> {
-    std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
     report::write(outcomes, given, out)?;
     if json {
         let totals = report::SYSTEMS.map(|(system, _)| (system, report::total(outcomes, system)));

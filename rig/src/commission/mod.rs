@@ -15,6 +15,7 @@ mod steps;
 pub use options::Commission;
 pub use record::{Record, Step};
 
+use crate::folder::check_place;
 use crate::machine::Machine;
 use crate::scenario::System as _;
 use crate::scenario::traction::Traction;
@@ -31,6 +32,7 @@ pub fn command(commission: &Commission) -> Result<ExitCode> {
     let Some(out) = &identify.options.out else {
         bail!("--out: must name the machine folder to make");
     };
+    check_place(out)?;
     let machine = Machine::load(identify.options.machine.as_deref().unwrap_or(Traction::MACHINE))?;
     let path = commission.record.clone().unwrap_or_else(|| {
         let name = out.file_name().unwrap_or_default().to_string_lossy();

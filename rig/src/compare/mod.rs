@@ -10,7 +10,7 @@ pub use flaws::{FLAW_HEADS, FlawRow, flaws, table as flaws_table};
 pub use outcome::Row;
 pub use parts::{PartRow, parts};
 
-use crate::files::write_text;
+use crate::files::{make_folder, write_text};
 use crate::machine::Machine;
 use crate::run::bar;
 use crate::scenario::catalogue::{self, Chosen};
@@ -94,6 +94,7 @@ fn outcome<S: System>(choice: &Choice<S>) -> Result<Outcome> {
 
 /// The command. Exit code 1 where a row is not ahead and nothing says why.
 pub fn run(options: &CompareOptions) -> Result<ExitCode> {
+    options.out.as_deref().map_or(Ok(()), make_folder)?;
     if options.parts {
         return run_parts(options);
     }
@@ -112,7 +113,6 @@ pub fn run(options: &CompareOptions) -> Result<ExitCode> {
         crate::say!("{ahead} of {} rows ahead\n\n{}", rows.len(), table.trim_fmt());
     }
     if let Some(out) = &options.out {
-        std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
         let mut csv = csv::Writer::from_path(out.join("compare.csv"))?;
         csv.write_record(["quantity", "tractive", "pi", "ahead"])?;
         for row in &rows {
@@ -140,7 +140,6 @@ fn run_parts(options: &CompareOptions) -> Result<ExitCode> {
     }));
     crate::say!("{}", table.trim_fmt());
     if let Some(out) = &options.out {
-        std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
         let lines: Vec<_> = rows.iter().map(PartRow::markdown).collect();
         let text =
             format!("| {} |\n|---|---|---:|---:|---:|\n{}\n", PART_HEADS.join(" | "), lines.join("\n"));
@@ -160,7 +159,6 @@ fn run_flaws(options: &CompareOptions) -> Result<ExitCode> {
         crate::say!("{}", table.trim_fmt());
     }
     if let Some(out) = &options.out {
-        std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
         write_text(&out.join("flaws.md"), &flaws_table(&rows))?;
     }
     Ok(ExitCode::SUCCESS)

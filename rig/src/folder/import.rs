@@ -101,6 +101,11 @@ impl Import {
     fn resampled(&self, half: &Rectangle) -> Result<FluxMap> {
         let most_a = self.given.max_current;
         let (first, last, last_q) = half.ends();
+        ensure!(
+            first < 0.0,
+            "{}: id: begins at {first}: must go below 0, with d along the magnets (--d-axis, --negate)",
+            self.map.display()
+        );
         let reach = |ends: f64, what: &str| {
             ensure!(
                 ends >= most_a * (1.0 - 1e-9),

@@ -13,8 +13,8 @@ mod write;
 pub use given::Given;
 pub use import::{DAxis, Import};
 pub use nameplate::Nameplate;
-pub use show::{Show, page};
-pub use write::{Contents, csv, digits, folder as write_folder, toml};
+pub use show::{Show, page, usual_page};
+pub use write::{Contents, check_place, csv, digits, folder as write_folder, toml};
 
 use anyhow::Result;
 use clap::Subcommand;

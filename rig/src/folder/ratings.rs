@@ -23,6 +23,8 @@ pub struct Ratings {
 /// Rated torque, as a share of the largest, and rated speed over the corner of the largest: a machine's usual proportions.
 const RATED_TORQUE: f64 = 0.7;
 const RATED_SPEED: f64 = 1.05;
+/// Share of the largest speed below which no machine's full torque ends: its values are in other units.
+const ODD_CORNER: f64 = 0.02;
 /// Ten minutes of full torque are the longest that a rotor may take to its largest speed.
 const LONGEST_S: f64 = 600.0;
 
@@ -48,7 +50,8 @@ impl Ratings {
             let most = LONGEST_S * max_torque_nm / (given.max_speed_rpm * TAU / 60.0);
             ensure!(
                 inertia <= most,
-                "--inertia {inertia}: must be at most {most:.3e} kg·m²: {max_torque_nm} N·m takes ten minutes to --max-speed-rpm {} with it",
+                "--inertia {inertia}: must be at most {} kg·m²: {max_torque_nm} N·m takes ten minutes to --max-speed-rpm {} with it",
+                rounded_down(most),
                 given.max_speed_rpm
             );
         }
@@ -104,10 +107,18 @@ impl Ratings {
     fn told(&self, given: &Given) -> String {
         let Self { max_torque_nm, max_power_w, corner_rpm, magnet_wb, .. } = self;
         let mut text = format!(
-            "{}: {max_torque_nm} N·m up to {corner_rpm:.0} r/min, {max_power_w} W, {} r/min at most",
+            "{}: {max_torque_nm} N·m up to {corner_rpm:.*} r/min, {max_power_w} W, {} r/min at most",
             given.out.display(),
+            usize::from(*corner_rpm < 100.0),
             given.max_speed_rpm
         );
+        if *corner_rpm < ODD_CORNER * given.max_speed_rpm {
+            let _ = write!(
+                text,
+                "\nfull torque ends at {:.1} % of the largest speed: are inductances in H, flux linkages in Wb?",
+                100.0 * corner_rpm / given.max_speed_rpm
+            );
+        }
         // Line to line, peak: what the diodes rectify.
         let emf_v = 3.0_f64.sqrt() * given.omega(given.max_speed_rpm) * magnet_wb;
         let highest_v = digits(given.link_v()[2]);

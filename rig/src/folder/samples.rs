@@ -34,9 +34,13 @@ pub fn read(path: &Path, rms: bool) -> Result<Vec<Sample>> {
         .from_reader(text);
     let broken = |error: csv::Error| {
         let line = error.position().map_or(0, |position| line_of(text, position));
-        anyhow!("{file}:{line}: must be text in columns: {error}")
+        match error.kind() {
+            csv::ErrorKind::Utf8 { .. } => anyhow!("{file}:{line}: must be text in UTF-8, as ASCII is"),
+            _ => anyhow!("{file}:{line}: must be text in columns: {error}"),
+        }
     };
     let headers = reader.headers().map_err(broken)?.clone();
+    ensure!(!headers.is_empty(), "{file}: is empty: must hold a head and a line for each node");
     let line = headers.position().map_or(1, |position| line_of(text, position));
     let columns = columns(&headers, rms).with_context(|| format!("{file}:{line}"))?;
     let mut samples = Vec::new();
@@ -46,6 +50,13 @@ pub fn read(path: &Path, rms: bool) -> Result<Vec<Sample>> {
         if record.iter().all(str::is_empty) {
             continue;
         }
+        // An empty one at the end is a delimiter too many.
+        let cells = (1..=record.len()).rev().find(|n| !record[n - 1].is_empty()).unwrap_or(0);
+        ensure!(
+            cells <= headers.len(),
+            "{file}:{line}: {cells} cells: must be {} as in the head; with decimal commas, semicolons part the columns",
+            headers.len()
+        );
         let mut values = [0.0; 4];
         for (place, column) in &columns {
             let field = record.get(*place).unwrap_or("");

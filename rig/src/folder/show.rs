@@ -89,10 +89,7 @@ impl Show {
     pub fn write(&self) -> Result<()> {
         let machine = Machine::load(&self.machine)?;
         let name = &machine.folder.parameters.name;
-        let file = self.out.clone().unwrap_or_else(|| {
-            let plain = |letter: char| if letter.is_alphanumeric() { letter } else { '-' };
-            format!("target/tractive/machine-{}.html", name.chars().map(plain).collect::<String>()).into()
-        });
+        let file = self.out.clone().unwrap_or_else(|| usual_page("machine", name));
         if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder).with_context(|| format!("--out {}", file.display()))?;
         }
@@ -106,6 +103,12 @@ impl Show {
         }
         Ok(())
     }
+}
+
+/// The usual place of a page about a machine, whatever its name holds.
+pub fn usual_page(what: &str, name: &str) -> PathBuf {
+    let plain = |letter: char| if letter.is_alphanumeric() { letter } else { '-' };
+    format!("target/tractive/{what}-{}.html", name.chars().map(plain).collect::<String>()).into()
 }
 
 /// The page of a machine.
@@ -352,5 +355,18 @@ impl<'a> View<'a> {
             }
         };
         self.speeds(ROWS).map(of).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_stays_in_its_folder_whatever_the_machine_is_called() {
+        assert_eq!(
+            usual_page("identify", "my hub/../1"),
+            PathBuf::from("target/tractive/identify-my-hub----1.html")
+        );
     }
 }

@@ -1,7 +1,8 @@
 //! A machine folder written whole or not at all.
 
+use crate::files::check_folder;
 use crate::platform::written_folder;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use tractive_tablegen::{FluxMap, MachineFolder};
@@ -16,32 +17,46 @@ pub struct Contents {
 
 const FILES: [&str; 2] = ["machine.toml", "flux_map.csv"];
 
-/// Writes a folder beside its place, has the table generator read it, and moves it there.
+/// Writes a folder beside its place, has the table generator read it and the drive check its tables, and moves it there.
 ///
 /// # Errors
-/// Where the place is taken by anything but a machine folder, the generator refuses the contents, or it cannot be written.
+/// Where the place is taken by anything but a machine folder, the generator or the drive refuses the contents, or it cannot be written.
 pub fn folder(out: &Path, contents: &Contents) -> Result<()> {
     let taken = check_place(out)?;
     let fill = |folder: &Path| {
         for (name, text) in FILES.iter().zip([&contents.toml, &contents.map]) {
             std::fs::write(folder.join(name), text)?;
         }
-        let read = MachineFolder::read(folder).map(|_| ());
-        read.map_err(|error| {
+        let read = MachineFolder::read(folder).map_err(|error| {
             // The file is never seen: its key and what is allowed are.
             let file = error.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
             anyhow::anyhow!("the table generator refuses the {file} of these values: {}", error.problem)
+        })?;
+        read.tables().check().map_err(|refused| {
+            let why = match (refused.name, refused.value < refused.least) {
+                ("weakening.flux_knee_wb", true) => {
+                    "; the link has dozens of times the voltage that the largest speed needs"
+                }
+                ("weakening.flux_knee_wb", false) => {
+                    "; are inductances in H, flux linkages in Wb? The link has a hundredth of their voltage"
+                }
+                _ => "",
+            };
+            anyhow::anyhow!("the drive refuses the tables of these values: {refused}{why}")
         })
     };
     written_folder(out, taken, fill)
 }
 
 /// The place is free, or an empty folder, or, which is `true`, a machine folder.
-fn check_place(out: &Path) -> Result<bool> {
+///
+/// # Errors
+/// Where anything else is there, or a file in its way.
+pub fn check_place(out: &Path) -> Result<bool> {
+    check_folder(out)?;
     if !out.exists() {
         return Ok(false);
     }
-    ensure!(out.is_dir(), "--out {}: must be a folder, or nothing yet", out.display());
     let entries = std::fs::read_dir(out).and_then(|entries| {
         entries.map(|entry| Ok(PathBuf::from(entry?.file_name()))).collect::<std::io::Result<Vec<_>>>()
     });

@@ -27,7 +27,7 @@ pub use turn::Rotor;
 
 use crate::can;
 use crate::files::write_text;
-use crate::folder::{Contents, csv, write_folder};
+use crate::folder::{Contents, check_place, csv, usual_page, write_folder};
 use crate::machine::Machine;
 use crate::options::{not_negative, positive};
 use crate::report::{self, Page};
@@ -76,6 +76,7 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
     let Some(out) = &identify.options.out else {
         bail!("--out: must name the machine folder to make");
     };
+    check_place(out)?;
     let machine = Machine::load(identify.options.machine.as_deref().unwrap_or(Traction::MACHINE))?;
     let outcome = match identified(identify, &machine)? {
         Ok(outcome) => outcome,
@@ -85,10 +86,7 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
         }
     };
     write_folder(out, &contents(&outcome, &machine))?;
-    let page = match &identify.page {
-        Some(page) => page.clone(),
-        None => PathBuf::from(format!("target/tractive/identify-{}.html", machine.tables.name)),
-    };
+    let page = identify.page.clone().unwrap_or_else(|| usual_page("identify", machine.tables.name));
     write_page(&outcome, &machine, &page)?;
     if identify.options.json {
         crate::say!("{}", serde_json::to_string(outcome.figures().values())?);

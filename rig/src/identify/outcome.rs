@@ -7,6 +7,7 @@ use super::signs::Signs;
 use super::turn::{Rotor, turned_deg};
 use crate::analysis::Figures;
 use crate::machine::Machine;
+use crate::pictures::sheet::number;
 use crate::report::Page;
 use crate::scenario::traction::Options;
 use anyhow::Result;
@@ -195,12 +196,12 @@ impl Outcome {
         let shares = [0.0, 0.4, 0.8];
         let of_d = shares.map(|share| {
             let curve = along(-most, 0.2 * most).map(|id| (id, self.fit.flux(id, share * most).0)).collect();
-            (format!("iq = {:.3} A", share * most), curve)
+            (format!("iq = {} A", number(share * most)), curve)
         });
         page.draw_xy(None, "flux linkage along d over id", ("id in A", "Wb"), &of_d);
         let of_q = shares.map(|share| {
             let curve = along(0.0, most).map(|iq| (iq, self.fit.flux(-share * most, iq).1)).collect();
-            (format!("id = {:.3} A", -share * most), curve)
+            (format!("id = {} A", number(-share * most)), curve)
         });
         page.draw_xy(None, "flux linkage along q over iq", ("iq in A", "Wb"), &of_q);
         self.draw_trust(most, page);

@@ -204,7 +204,9 @@ fn with_room((low, high): Point, share: f64) -> Point {
         return (0.0, 1.0);
     }
     let least = 1e-6 * low.abs().max(high.abs()).max(1e-6);
-    let room = (share * (high - low)).max(if high - low < least { least } else { 0.0 });
+    // Of a level curve so much that the numbers of its axis differ.
+    let level = 0.1 * low.abs().max(high.abs()).max(1e-5);
+    let room = (share * (high - low)).max(if high - low < least { level } else { 0.0 });
     (low - room, high + room)
 }
 
@@ -331,6 +333,15 @@ mod tests {
         let text = subscripts("U_{in} = 2\n1\n");
         assert!(text.starts_with("U<tspan dy=\".3em\" font-size=\"75%\">in</tspan>"), "{text}");
         assert!(text.ends_with("<tspan dx=\".28em\" dy=\"-.225em\">= 2</tspan>\n1\n"), "{text}");
+    }
+
+    #[test]
+    fn numbers_beside_a_level_curve_differ() {
+        let mut panel =
+            Panel::new((0.0, 0.0, 400.0, 300.0), "", Axis::fitted("id in A"), Axis::fitted("L in mH"));
+        panel.line([(-40.0, 0.2), (0.0, 0.2)], BLUE, 1.0);
+        let svg = draw((400, 300), &[panel]).unwrap();
+        assert_eq!(svg.lines().filter(|line| *line == "0.2").count(), 1, "{svg}");
     }
 
     #[test]

@@ -114,11 +114,13 @@ impl<'a> Loci<'a> {
         held.map(|((point, _), rpm)| (point, rpm)).collect()
     }
 
-    /// The drive's currents for all the torque there is, from standstill to a speed, each with that speed.
+    /// The drive's currents for all the torque there is, from standstill to a speed, each with that speed; they end where no current
+    /// within the largest one is left.
     pub fn outer(&self, to_rpm: f64) -> Vec<(Point, f64)> {
         let beyond = 10.0 * self.machine.folder.parameters.max_torque_nm;
         let speeds = (1..=600).map(|k| to_rpm * (f64::from(k) / 600.0).powi(2));
-        speeds.map(|rpm| (self.drives(beyond, rpm).0, rpm)).collect()
+        let points = speeds.map(|rpm| (self.drives(beyond, rpm).0, rpm));
+        points.take_while(|((d, q), _)| d.hypot(*q) <= 1.01 * self.largest_a()).collect()
     }
 
     /// The drive's currents at full torque, then at full power, up to a speed.

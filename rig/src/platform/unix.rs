@@ -5,7 +5,7 @@
 pub(crate) mod can;
 
 use crate::run::bar;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use indicatif::ProgressBar;
 use rustix::fs::{CWD, FileType, Mode, RenameFlags, renameat_with};
 use std::io::Write;
@@ -71,7 +71,9 @@ pub(crate) fn make_fifo(path: &Path) -> Result<()> {
 
 /// Writes a file whole or not at all.
 pub(crate) fn written(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    ensure!(folder.is_dir(), "{}: there is no folder {}", path.display(), folder.display());
+    ensure!(!path.is_dir(), "{}: is a folder: must be a file, or nothing yet", path.display());
     let mut file = NamedTempFile::new_in(folder).with_context(|| folder.display().to_string())?;
     fill(&mut file)?;
     file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use tractive::protection::{Fault, Trip};
 
 /// Ends of figures' names, and the units they stand for.
-const UNITS: [(&str, &str); 18] = [
+const UNITS: [(&str, &str); 21] = [
     ("_percent", "%"),
     ("_rpm", "r/min"),
     ("_per_s", "/s"),
@@ -21,7 +21,10 @@ const UNITS: [(&str, &str); 18] = [
     ("_hz", "Hz"),
     ("_deg", "°"),
     ("_wb", "Wb"),
+    ("_mwb", "mWb"),
     ("_mh", "mH"),
+    ("_ohm", "Ω"),
+    ("_kg_m2", "kg·m²"),
     ("_a", "A"),
     ("_v", "V"),
     ("_s", "s"),
@@ -223,6 +226,8 @@ mod tests {
         assert!(text.contains("peak current") && text.contains("247.1 A"), "{text}");
         assert_eq!(split_unit("overshoot in % of the step"), ("overshoot of the step".to_owned(), "%"));
         assert_eq!(quantity("back_within_0p2_percent_ms"), ("back within 0.2 %".to_owned(), "ms"));
+        assert_eq!(quantity("stator_resistance_ohm"), ("stator resistance".to_owned(), "Ω"));
+        assert_eq!(quantity("rotor_inertia_kg_m2"), ("rotor inertia".to_owned(), "kg·m²"));
         assert_eq!(digits(0.000_123_4), "1.23e-4");
     }
 }

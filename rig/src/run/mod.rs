@@ -32,7 +32,12 @@ pub const fn clock(control_hz: u32) -> Clock {
 
 /// The error of an image that does not start.
 pub(crate) fn refused(refused: Refused) -> anyhow::Error {
-    anyhow::anyhow!("configuration refused: {refused}")
+    let option = match refused.name.rsplit('.').next() {
+        Some("dead_time_ticks") => " (--dead-time-us)",
+        Some("min_pulse_ticks") => " (--min-pulse-us)",
+        _ => return anyhow::anyhow!("configuration refused: {refused}"),
+    };
+    anyhow::anyhow!("configuration refused: {refused}{option}, {} a µs", TICKS_HZ / 1_000_000)
 }
 
 /// The sender of commands over the protocol.

@@ -3,12 +3,12 @@
 use super::catalogue::{self, Chosen};
 use super::{Choice, System};
 use crate::analysis::Figures;
-use crate::files::write_text;
+use crate::files::{forget, make_folder, write_text};
 use crate::machine::Machine;
 use crate::options::RunOptions;
 use crate::report::{self, Page};
 use crate::trace::Recorded;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -61,7 +61,7 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
 pub fn folder(name: &str, options: &RunOptions) -> Result<PathBuf> {
     let usual = || std::env::var_os("TRACTIVE_OUT").map_or("target/tractive".into(), PathBuf::from);
     let out = options.out.clone().unwrap_or_else(|| usual().join(name));
-    std::fs::create_dir_all(&out).with_context(|| format!("--out {}", out.display()))?;
+    make_folder(&out)?;
     Ok(out)
 }
 
@@ -94,8 +94,10 @@ pub fn write<S: System>(
     recording.write_trace(&out.join("trace.csv"))?;
     recording.write_events(out)?;
     recording.write_recorder(&out.join("recorder.csv"))?;
-    if let Some(overview) = S::overview(recording)? {
-        write_text(&out.join("overview.svg"), &overview)?;
+    let picture = out.join("overview.svg");
+    match S::overview(recording)? {
+        Some(overview) => write_text(&picture, &overview)?,
+        None => forget(&picture)?,
     }
     let mut page = Page::new(choice.name, &choice.title(machine));
     page.headline(&report::headline(figures, recording.trip()));

@@ -10,7 +10,7 @@ mod merge;
 pub use file::{ShardFile, name};
 pub use merge::{Merged, merge};
 
-use crate::files;
+use crate::files::{self, make_folder};
 use crate::run::bar;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
@@ -122,7 +122,7 @@ pub fn run(
     folder: &Path,
     row: impl Fn(usize) -> Result<String> + Sync,
 ) -> Result<()> {
-    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    make_folder(folder)?;
     let path = folder.join(name(shard));
     let mut file = ShardFile::resumed(&path, plan, shard)?;
     let left: Vec<usize> =

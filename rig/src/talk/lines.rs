@@ -21,7 +21,8 @@ impl Lines {
     /// A script's. The error names the file, the line and the word.
     pub fn of_script(path: &Path, system: System) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        let lines = script::script(&text, system).with_context(|| path.display().to_string())?;
+        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        let lines = script::script(text, system).with_context(|| path.display().to_string())?;
         Ok(Self::Script(lines.into()))
     }
 

@@ -7,11 +7,11 @@ use crate::campaign::options::CampaignOptions;
 use crate::campaign::report::{Part, renew_with};
 use crate::campaign::traction::Drive;
 use crate::campaign::traction::random::DIMENSIONS;
-use crate::files::write_text;
+use crate::files::{make_folder, write_text};
 use crate::run::bar;
 use crate::scenario::traction::PatternsName;
 use crate::shards::{self, Merged, Plan, seed};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -66,6 +66,7 @@ impl Random {
 
 /// Runs the campaign. Exit code 1 where a run is uncaught, or the document is not up to date.
 pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
+    ensure!(runs > 0, "--random 0: must be at least 1");
     let random = Random::new(runs, options.seed, options.patterns)?;
     if let Some(run) = options.run {
         let run = random.run(run)?;
@@ -83,6 +84,7 @@ pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
         shards::run(&plan, shard, &options.out, |run| random.run(run)?.row())?;
         return Ok(ExitCode::SUCCESS);
     }
+    make_folder(&options.out)?;
     let bar = bar(runs as u64, "random [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
     let row = |run: usize| {
         let row = random.run(run)?.row();
@@ -91,7 +93,6 @@ pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
     };
     let rows = (0..runs).into_par_iter().map(row).collect::<Result<_>>()?;
     bar.finish_and_clear();
-    std::fs::create_dir_all(&options.out).with_context(|| format!("--out {}", options.out.display()))?;
     let merged = Merged { plan, rows };
     let mut good = finish(&merged, &options.out)?;
     if let Some(path) = &options.doc {

@@ -256,8 +256,8 @@
       const isLast = k === this.plan.panels.length - 1, narrow = this.width < 500;
       const height = Math.max(this.plan.panels.length === 1 ? 250 : k === 0 ? 190 : 150, 16 * panel.levels.length + 34) + (isLast ? 26 : 0) - (narrow ? 20 : 0);
       // The names stand below the title where both do not fit beside each other.
-      const long = panel.series.reduce((sum, { name }) => sum + 100 + 7 * name.length, 0);
-      const fits = narrow || this.axis + 7 * panel.label.length + long <= this.width, rows = fits ? 0 : Math.ceil(long / this.width);
+      const long = panel.series.reduce((sum, { name }) => sum + 100 + 8 * name.length, 0);
+      const fits = narrow || this.axis + 8 * panel.label.length + long <= this.width, rows = fits ? 0 : Math.ceil(long / this.width);
       this.hosts[k].parentElement.classList.toggle("two", !fits);
       const line = { font: FONT, stroke: css("muted"), grid: { stroke: css("grid"), width: 1 }, ticks: { stroke: css("line"), width: 1, size: 4 } };
       const names = panel.levels, span = () => this.shown[1] - this.shown[0];
@@ -293,7 +293,7 @@
     series(panel, { name, ink, style }, curve) {
       const dashed = style === "dashed";
       return {
-        label: name, stroke: css(ink), spanGaps: true, points: { show: false },
+        label: name, stroke: css(ink), spanGaps: true, points: { show: u => u.data[0].length === 1 },
         width: style === "ripple" ? 1 : dashed ? 1.6 : 1.4, dash: dashed ? [6, 4] : undefined,
         // The value itself, not what stands for it where many are drawn as one.
         value: (u, y, s, k) => (y == null ? "" : panel.levels.length ? panel.levels[Math.round(y)] ?? "" : String(+curve.at(u.data[0][k]).toPrecision(5))),

@@ -56,19 +56,23 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
     }
 }
 
-fn stretches(recording: &Recording) -> Vec<Stretch> {
+fn stretches(recording: &Recording, machine: &Machine) -> Vec<Stretch> {
     let windows = [
         ("the chopper takes it", BRAKE.0, HALF_S),
         ("half of the resistor", HALF_S, NONE_S),
         ("no resistor", NONE_S, TAKES_S),
         ("the source takes it", TAKES_S, BRAKE.1),
     ];
+    let ohm = machine.folder.parameters.stator_resistance_ohm;
     windows
         .into_iter()
         .map(|(what, from, until)| {
             let rows = analysis::window(recording, from, until);
             let steady = &rows[rows.len() / 2..];
-            let power = |row: &Row| -row.te_nm * row.speed_rpm * core::f64::consts::TAU / 60e3;
+            // What the copper takes never reaches the link.
+            let copper_w = |row: &Row| 1.5 * ohm * (row.id_a.powi(2) + row.iq_a.powi(2));
+            let shaft_w = |row: &Row| -row.te_nm * row.speed_rpm * core::f64::consts::TAU / 60.0;
+            let power = |row: &Row| 1e-3 * (shaft_w(row) - copper_w(row));
             Stretch {
                 what,
                 link_v: mean(steady, |row| row.udc_v),
@@ -116,7 +120,7 @@ impl Scenario<Traction> for Chopper {
     fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let ratings = &machine.tables.ratings;
-        let stretches = stretches(recording);
+        let stretches = stretches(recording, machine);
         let [whole, half, none, source] = &stretches[..] else { unreachable!("four stretches") };
         let (trip_v, highest_v) = (f64::from(ratings.trip_dc_over_v), f64::from(ratings.dc_link_max_v));
         // Where the link's rise ends, between its highest operating voltage (0) and the trip (1).

@@ -47,7 +47,7 @@ use crate::run::traction::{OnBench, Tasks, Together, run_in_qemu};
 use crate::run::{self, CLOCK, Progress, Supervisor};
 use crate::trace::Recording;
 use ablated::Ablated;
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use flaws::{Beside, Filled, FlawOptions};
 use serde::{Deserialize, Serialize};
@@ -345,10 +345,14 @@ impl System for Traction {
         // A drive that knows the filter takes it for a delay.
         let most_known_us = shortest_half_us.min(0.3e6 / fastest_rad_s);
         let own = |name: &str| scenario.get(name).and_then(Value::as_f64).unwrap_or(0.0);
+        let (switching_hz, control_hz) = (parameters.max_switching_hz, control_hz(options, machine));
+        // A carrier lasts a control period at least.
+        ensure!(
+            (50.0..=f64::from(control_hz)).contains(&switching_hz),
+            "max_switching_hz {switching_hz}: must be from 50 to {control_hz}, the rate of control: see --control-hz"
+        );
         within(&[
             ("--dt", options.dt.unwrap_or(0.1), f64::from(clock.ticks_per_s).recip(), 0.1),
-            // A carrier lasts a control period at least.
-            ("max_switching_hz", parameters.max_switching_hz, 50.0, f64::from(control_hz(options, machine))),
             ("--udc", udc_v, 0.0, 10.0 * parameters.dc_link_max_v),
             ("--torque-scale", own("torque_scale"), -10.0, 10.0),
             ("--speed", own("speed"), -fastest_rpm, fastest_rpm),
