@@ -18,8 +18,8 @@ struct Wanted {
     udc_v: f64,
 }
 
-/// Current or voltage over its limit up to which that is kept: what interpolation adds is far below.
-const KEPT: f32 = 1.005;
+/// Current or voltage over its limit up to which that counts as kept: what interpolation adds beyond the largest speed is below.
+const KEPT: f32 = 1.05;
 
 /// The name of a sweep in shards.
 pub const POINTS: &str = "points";
