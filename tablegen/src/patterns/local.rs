@@ -22,7 +22,7 @@ pub(super) struct Problem<'a> {
     pub shortest_rad: f64,
     /// Least and largest value of each angle, in rad.
     pub bounds: &'a [(f64, f64)],
-    /// What counts beside the square of the distortion, if anything does.
+    /// Cost beside the square of the distortion, if there is any.
     pub beside: Option<&'a dyn Fn(&Waveform) -> f64>,
 }
 
