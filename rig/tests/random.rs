@@ -46,6 +46,20 @@ fn a_gate_that_sticks_between_two_ticks_sticks() {
     is_caught(&run, "uh-stuck-on", "driver_blocked");
 }
 
+/// An upper switch that stays off, with three pulses a turn on a high link and 6 % less flux linkage: the current of its phase goes from 0 to −305 A within
+/// 0.65 ms, and the boundary that would see the leg comes 0.2 ms later.
+#[test]
+fn a_current_that_reaches_its_trip_level_before_the_leg_is_seen_is_caught() {
+    let odd = [
+        ("acceleration_rpm_s", 2371.8148106864437),
+        ("line_v", 1693.1865345651597),
+        ("flux_scale", 0.9391857478414851),
+    ];
+    let place = (2089.568547956519, 0.22654403415105795, 8.336447222037801);
+    let run = case(0.8150880167619147, 0.8859827699361494, place, &odd);
+    is_caught(&run, "vh-stuck-off", "overcurrent");
+}
+
 /// The drive trips at more where a sensor reads too little: that is the sensor's, and no fault of the drive.
 #[test]
 fn trip_levels_are_those_of_what_is_read() {

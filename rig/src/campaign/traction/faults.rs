@@ -114,10 +114,12 @@ fn supply(list: &mut Faults<Cause>) {
 fn legs(list: &mut Faults<Cause>) {
     const BLOCKED: &[Fault] = &[Fault::DriverBlocked];
     const STUCK: &[Fault] = &[Fault::LegStuck];
+    // With three pulses a turn a boundary comes every 0.6 ms: the phase's current may reach its trip level before one sees the leg.
+    const OPEN: &[Fault] = &[Fault::LegStuck, Fault::Overcurrent];
     for (gate, name) in (0_u8..).zip(GATES) {
         let first = gate < 2;
         list.add(&format!("{name}-stuck-on"), Kind::Gate(gate, true), BLOCKED, None, first);
-        list.add(&format!("{name}-stuck-off"), Kind::Gate(gate, false), STUCK, Some(UNFELT), first);
+        list.add(&format!("{name}-stuck-off"), Kind::Gate(gate, false), OPEN, Some(UNFELT), first);
         list.add(&format!("{name}-shorted"), Kind::Device(gate), BLOCKED, None, first);
     }
     for (leg, letter) in ["u", "v", "w"].into_iter().enumerate() {
