@@ -95,18 +95,9 @@ pub(super) fn limits(
         index_limit,
         steady_share: 1.0,
         filled,
-        ripple_share: if aliases(mode, settings) { 0.0 } else { ripple_share(trimmed, modulation_index) },
+        ripple_share: ripple_share(trimmed, modulation_index),
         settled: exit.is_settled(decision),
     }
-}
-
-/// Samples in a carrier half, doubled, below which they alias: of a carrier's ripple they see always the same, or wander through it slowly.
-const TWICE_SAMPLES: u32 = 7;
-
-/// `true` for a free carrier so fast that the samples' mean torque is not the carrier's.
-const fn aliases(mode: Mode, settings: &Settings) -> bool {
-    let Settings { devices, clock, .. } = settings;
-    matches!(mode, Mode::Async) && 2 * devices.shortest_half_ticks < TWICE_SAMPLES * clock.control_ticks
 }
 
 /// The change of the link that is expected after the sample of a command, in V.
@@ -241,20 +232,7 @@ fn number(from: Mode, to: Mode, half: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modulation::{CarrierHalf, SwitchLimits};
-    use crate::time::Clock;
-
-    #[test]
-    fn a_free_carrier_of_fewer_than_seven_samples_aliases() {
-        let clock = Clock::new(25_000_000, 2_500);
-        let of = |mode: Mode, switching_hz: f32| {
-            aliases(mode, &Settings::new(clock, SwitchLimits::new(250, 0, switching_hz, &clock)))
-        };
-        for (switching_hz, does) in [(900.0, false), (1_428.0, false), (1_429.0, true), (10_000.0, true)] {
-            assert_eq!(of(Mode::Async, switching_hz), does, "{switching_hz} Hz");
-        }
-        assert!(!of(Mode::Sync15, 10_000.0), "its ripple is known");
-    }
+    use crate::modulation::CarrierHalf;
 
     /// A pattern's ripple of a machine that turns backward is that of one that turns forward, upside down.
     #[test]
