@@ -153,7 +153,10 @@ impl Modulator {
     /// control can lead the flux to where the new pattern begins.
     fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
         if let Some(plan) = self.plan {
-            if plan.at == self.next_half {
+            // A step of torque may have come since.
+            if self.mode.is_carrier() && !self.may_begin(plan.to, pulse) {
+                self.plan = None;
+            } else if plan.at == self.next_half {
                 self.switch_to(start, plan.to, pulse);
             }
             return;
@@ -164,8 +167,7 @@ impl Modulator {
         }
         if self.mode.carriers() > 0 && wanted.carriers() > 0 {
             let at = self.half_after(self.next_half, AHEAD);
-            let keeps_angle = wanted.is_carrier() || self.keeps_its_angle(pulse);
-            if keeps_angle && schedule::may_switch(self.mode, wanted, at) {
+            if self.may_begin(wanted, pulse) && schedule::may_switch(self.mode, wanted, at) {
                 self.plan = Some(Plan { to: wanted, at });
             }
         } else if schedule::may_switch(self.mode, wanted, self.next_half) && self.begins_calmly(wanted, pulse)
@@ -192,10 +194,11 @@ impl Modulator {
         true
     }
 
-    /// `true` if the locked half that begins at pulse angle `pulse` begins where it should. After a step of torque a carrier catches up
-    /// with its angle over many halves; a pattern that began then would have its pulses in the wrong place.
-    fn keeps_its_angle(&self, pulse: Angle) -> bool {
-        (boundary(self.next_half, self.mode.carriers()) - pulse).signed().unsigned_abs() < KEPT_ANGLE.0
+    /// `true` if the locked half that begins at pulse angle `pulse` begins where it should, or a carrier is to follow. After a step of torque a
+    /// carrier catches up with its angle over many halves; a pattern that began then would have its pulses in the wrong place.
+    fn may_begin(&self, wanted: Mode, pulse: Angle) -> bool {
+        let off = boundary(self.next_half, self.mode.carriers()) - pulse;
+        wanted.is_carrier() || off.signed().unsigned_abs() < KEPT_ANGLE.0
     }
 
     fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {

@@ -106,6 +106,36 @@ fn a_pattern_waits_until_the_carrier_keeps_its_angle() {
     }
 }
 
+/// A step of torque after the announcement of a pattern takes it back, in either of the two halves; once the carrier keeps its angle again the
+/// pattern is announced anew.
+#[test]
+fn a_step_of_torque_takes_an_announced_pattern_back() {
+    let pairs = locked().flat_map(|from| locked().map(move |to| (from, to)));
+    for (from, to) in pairs.filter(|(from, to)| from.is_carrier() && !to.is_carrier()) {
+        for (step, off) in [1, 2].into_iter().flat_map(|step| [(step, KEPT_ANGLE), (step, Angle::DEG_90)]) {
+            let (mut modulator, mut start) = (in_mode(from, 0, to, false), START);
+            let mut course = |count: u32, off: Angle| {
+                let halves = (0..count).map(|_| {
+                    let half = next(&mut modulator, start, off);
+                    start = start.after(half.period_ticks);
+                    half
+                });
+                halves.collect::<Vec<_>>()
+            };
+            let mut announced = course(1, Angle::ZERO)[0];
+            while announced.ahead == [from; 2] {
+                announced = course(1, Angle::ZERO)[0];
+            }
+            let halves = [course(step - 1, Angle::ZERO), course(4 * from.carriers(), off)].concat();
+            let told = std::format!("{from:?} {to:?} {step}: {halves:?}");
+            assert!(halves.iter().all(|half| half.mode == from), "{told}");
+            assert!(halves[step as usize - 1..].iter().all(|half| half.ahead == [from; 2]), "{told}");
+            let halves = course(2 * from.carriers() + 3, Angle::ZERO);
+            assert!(halves.iter().any(|half| half.mode == to), "{from:?} {to:?} {step}: {halves:?}");
+        }
+    }
+}
+
 /// A switch that is announced comes, whatever is wanted meanwhile, and nothing else comes before.
 #[test]
 fn a_switch_that_is_announced_comes_whatever_is_wanted_meanwhile() {
