@@ -131,6 +131,7 @@ impl Schedule {
         const CARRIER_CATCHES_SHARE: f32 = 0.2;
         /// By how much the modulation index may stay below the operating point's by the map.
         const MAP_ROOM: f32 = 0.02;
+        let asked_index = seen.modulation_index;
         let seen = &Reference { modulation_index: self.filled_index(seen, devices), ..*seen };
         // No branch has less than its smallest index: where the machine has less flux linkage than its map, or the link jumps up, what is
         // made counts, at once.
@@ -152,16 +153,12 @@ impl Schedule {
             _ => {
                 // The first command is made for the mode that was announced while there was no voltage.
                 if seen.voltage_v == 0.0 {
-                    let carrier = seen.modulation_index < CARRIER_CATCHES
-                        && share(seen, devices) < CARRIER_CATCHES_SHARE;
+                    let carrier =
+                        asked_index < CARRIER_CATCHES && share(seen, devices) < CARRIER_CATCHES_SHARE;
                     self.catches = if carrier { Mode::Async } else { Mode::Mid3 };
                 }
                 let reach = pick(reached(Mode::Mid3.row(), shortest_notch(seen.rate, devices)), false);
-                if self.catches == Mode::Mid3 && seen.modulation_index >= reach {
-                    Mode::Square
-                } else {
-                    self.catches
-                }
+                if self.catches == Mode::Mid3 && asked_index >= reach { Mode::Square } else { self.catches }
             }
         }
     }
@@ -417,15 +414,19 @@ mod tests {
         }
     }
 
-    /// At its borders a carrier no longer catches.
+    /// At its borders a carrier no longer catches; three pulses do so up to what the machine itself needs, however far the fundamental is to be filled.
     #[cfg(feature = "optimal")]
     #[test]
     fn a_carrier_catches_below_its_borders_alone() {
         let devices = SwitchLimits { min_pulse_ticks: 250, dead_time_ticks: 0, shortest_half_ticks: 1 << 14 };
         let clock = Clock::new(25_000_000, 2_500);
-        for (index, share, catches) in
-            [(0.84, 0.19, Mode::Async), (0.85, 0.19, Mode::Mid3), (0.84, 0.2, Mode::Mid3)]
-        {
+        for (index, share, catches) in [
+            (0.84, 0.19, Mode::Async),
+            (0.85, 0.19, Mode::Mid3),
+            (0.84, 0.2, Mode::Mid3),
+            (0.8, 0.3295, Mode::Mid3),
+            (0.985, 0.3295, Mode::Square),
+        ] {
             let seen = Reference {
                 rate: share * 131_072.0,
                 udc_v: 1_500.0,
