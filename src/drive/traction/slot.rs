@@ -7,6 +7,10 @@ use crate::time::{Clock, Instant};
 /// Halves between, where a carrier lasts a control period.
 const MOST_BETWEEN: u32 = 2;
 
+/// Control periods within which an operating point serves another boundary: halves shorter than that make one for every second of them, as often as the
+/// free carrier's do.
+const SERVES_PERIODS: u32 = 3;
+
 /// The decision of a boundary: the mode of the half that begins at the one after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Decision {
@@ -17,9 +21,11 @@ pub(super) struct Decision {
 }
 
 impl Decision {
-    /// `true` if an operating point for one holds for the other, too.
-    pub fn is_of(&self, other: &Self) -> bool {
-        self.boundary == other.boundary && self.mode == other.mode
+    /// `true` if an operating point for one serves the other, too: that of the same boundary and mode, and that of one before which is less than
+    /// [`SERVES_PERIODS`] away.
+    pub fn serves(&self, other: &Self, clock: &Clock) -> bool {
+        let away = other.boundary.since(self.boundary) as u32;
+        self.mode == other.mode && away < SERVES_PERIODS * clock.control_ticks
     }
 }
 
@@ -74,6 +80,29 @@ impl Slot {
             commands,
             aims: !commands && left < 2 * period as i32,
             between,
+        }
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    /// An operating point serves its own boundary and those of the same mode that come less than three periods after it, also where instants wrap; none that
+    /// came before.
+    #[test]
+    fn an_operating_point_serves_its_mode_for_less_than_three_periods() {
+        let clock = Clock::new(25_000_000, 2_500);
+        let at = |instant: u32, mode| Decision { boundary: Instant(instant), mode, after: Mode::Mid3 };
+        for first in [0, 1_000_000, u32::MAX - 3_000] {
+            for (away, serves) in
+                [(0, true), (7_499, true), (7_500, false), (1 << 31, false), (u32::MAX, false)]
+            {
+                let aimed = at(first, Mode::Mid7);
+                let later = at(first.wrapping_add(away), Mode::Mid7);
+                assert_eq!(aimed.serves(&later, &clock), serves, "{first} {away}");
+                assert!(!aimed.serves(&Decision { mode: Mode::Mid3, ..later }, &clock), "{first} {away}");
+            }
         }
     }
 }
