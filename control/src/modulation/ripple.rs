@@ -94,7 +94,8 @@ const fn directions<const N: usize>(count: u32) -> [SinCos; N] {
 }
 
 /// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `modulation_index` of
-/// six-step: within a tenth of what the pulses have. The carriers count as one, that of 12 carriers a turn.
+/// six-step: within a tenth of what the pulses have, but for three pulses, which count by their torque. The carriers count as one, that of 12
+/// carriers a turn.
 pub fn ripple_share(mode: Mode, modulation_index: f32) -> f32 {
     #[cfg(feature = "optimal")]
     let modulation_index = mode.branch().map_or(modulation_index, |branch| branch.within(modulation_index));
