@@ -1,9 +1,10 @@
 //! The areas whose tests are tested, and the bounds that are asked of them.
 
 use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
 
 /// A part of the code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ValueEnum)]
 pub enum Area {
     Control,
     Modulation,

@@ -8,6 +8,7 @@ mod report;
 mod results;
 mod run;
 mod schema;
+mod shards;
 mod sites;
 mod tree;
 mod trials;
@@ -29,7 +30,7 @@ pub struct Options {
     /// Only those of files whose path begins so (may be repeated)
     #[arg(long)]
     file: Vec<String>,
-    /// Shard K of N, from 0
+    /// Shard K of N, from 0, into a file of its own
     #[arg(long, value_name = "K/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
     /// So many of them, evenly spread
@@ -66,9 +67,12 @@ pub struct Options {
     /// Name the mutants, and do nothing
     #[arg(long)]
     list: bool,
-    /// Say what came of all that were tried, and do nothing
+    /// Say what came of all that were tried, and do nothing; exit code 1 where one was not
     #[arg(long)]
     report: bool,
+    /// Make the results of the whole of all shards' files, and report
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["shard", "sample", "area", "file"])]
+    merge: Vec<PathBuf>,
 }
 
 fn shard(text: &str) -> Result<(usize, usize), String> {
@@ -85,7 +89,7 @@ pub struct Places {
 }
 
 fn main() -> Result<ExitCode> {
-    let options = Options::parse();
+    let mut options = Options::parse();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().map(Path::to_owned).unwrap_or_default();
     let places = Places { work: root.join("target/mutants"), root };
     let tree = tree::read(&places.root)?;
@@ -95,7 +99,10 @@ fn main() -> Result<ExitCode> {
         }
         return Ok(ExitCode::SUCCESS);
     }
-    if !options.report {
+    if !options.merge.is_empty() {
+        let paths = std::mem::take(&mut options.merge);
+        shards::merge(&paths, &places, &tree, &mut options)?;
+    } else if !options.report {
         run::run(&places, &tree, &options)?;
     }
     let good = report::print(&places, &tree, &options)?;

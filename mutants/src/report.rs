@@ -3,6 +3,7 @@
 use crate::areas::Area;
 use crate::results::{Count, KnownList, Outcome, Results};
 use crate::run::{chosen, left_out};
+use crate::shards;
 use crate::tree::Tree;
 use crate::{Options, Places};
 use anyhow::Result;
@@ -12,10 +13,10 @@ use std::fmt::Write;
 /// Errors that say that the mutant is no program: types that do not fit, a trait that is not there, a missing arm.
 const UNVIABLE: [&str; 8] = ["E0277", "E0308", "E0369", "E0600", "E0599", "E0368", "E0282", "E0283"];
 
-/// Prints the table and writes a list of survivors for each area; whether all that survived are known.
+/// Prints the table and writes a list of survivors for each area; `true` if all were tried, and all that survived are known.
 pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
-    let results = Results::open(&places.work.join("results.jsonl"))?;
-    let known = KnownList::read(&places.root.join("mutants/known.toml"))?;
+    let results = Results::open(&shards::file(places, options), None)?;
+    let known = KnownList::read(&places.root.join("mutants/known.toml"), &tree.mutants)?;
     let left_out = left_out(places, tree);
     let mut counts: BTreeMap<Area, Count> = BTreeMap::new();
     let mut survivors: BTreeMap<Area, String> = BTreeMap::new();
@@ -72,5 +73,9 @@ pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
     let [noticed, tried] = counts.values().map(Count::noticed).fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
     let share = 100.0 * noticed as f64 / tried.max(1) as f64;
     println!("{noticed} of {tried} are noticed by tests, or known: {share:.1} %");
-    Ok(options.least.map_or(noticed == tried, |least| share >= least))
+    let open: usize = counts.values().map(|count| count.open).sum();
+    if open > 0 {
+        println!("{open} were not tried");
+    }
+    Ok(open == 0 && options.least.map_or(noticed == tried, |least| share >= least))
 }

@@ -1,9 +1,10 @@
 //! Results of mutants, in a file that grows by a line each; a later line of the same mutant wins.
 
+use crate::shards::Head;
 use crate::tree::Mutant;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -43,14 +44,37 @@ pub struct Results {
 }
 
 impl Results {
-    /// Opens it, and reads what is there.
-    pub fn open(path: &Path) -> Result<Self> {
+    /// Opens it, and reads what is there. A shard's file begins with its head.
+    ///
+    /// # Errors
+    /// A file that cannot be written; one of another head.
+    pub fn open(path: &Path, head: Option<&Head>) -> Result<Self> {
         let text = std::fs::read_to_string(path).unwrap_or_default();
         let lines = text.lines().filter_map(|line| serde_json::from_str::<Line>(line).ok());
         let lines = lines.map(|line| (line.name.clone(), line)).collect();
         let file = OpenOptions::new().create(true).append(true).open(path);
-        let file = file.with_context(|| path.display().to_string())?;
+        let mut file = file.with_context(|| path.display().to_string())?;
+        if let Some(head) = head {
+            let there = text.lines().next().map(serde_json::from_str::<Head>);
+            match there {
+                None => writeln!(file, "{}", serde_json::to_string(head)?)?,
+                Some(Ok(there)) if there == *head => {}
+                Some(_) => bail!("{}: of another run; remove it to begin anew", path.display()),
+            }
+        }
+        // It was cut off in the middle of a line.
+        if !text.is_empty() && !text.ends_with('\n') {
+            writeln!(file)?;
+        }
         Ok(Self { path: path.to_owned(), file: Mutex::new(file), lines })
+    }
+
+    /// Writes a file anew, whole or not at all.
+    pub fn replace(path: &Path, lines: &[Line]) -> Result<()> {
+        let texts = lines.iter().map(|line| Ok(serde_json::to_string(line)? + "\n"));
+        let beside = path.with_extension("new");
+        std::fs::write(&beside, texts.collect::<Result<String>>()?)?;
+        Ok(std::fs::rename(&beside, path)?)
     }
 
     /// The result of a mutant, of the same source.
@@ -71,7 +95,8 @@ impl Results {
 pub struct Known {
     /// The reason of all of them.
     pub reason: String,
-    /// "FILE: WHAT in FUNCTION", and behind " @ " the line of the source where one function has the same mutation several times.
+    /// "FILE: WHAT in FUNCTION", and behind " @ " the line of the source where one function has the same mutation several times. Where a name still has
+    /// several mutants " #K" stands behind it for the K-th, from 1, or " (all N)" for all of so many.
     pub mutants: Vec<String>,
 }
 
@@ -79,27 +104,71 @@ pub struct Known {
 #[derive(Debug, Default, Deserialize)]
 pub struct KnownList {
     #[serde(default)]
-    pub known: Vec<Known>,
+    known: Vec<Known>,
+    /// The numbers of the mutants that are named.
+    #[serde(skip)]
+    numbers: BTreeSet<u32>,
 }
 
 impl KnownList {
-    pub fn read(path: &Path) -> Result<Self> {
+    /// Reads it.
+    ///
+    /// # Errors
+    /// A reason that is empty; a name of no mutant, of several, or of another number of them.
+    pub fn read(path: &Path, mutants: &[Mutant]) -> Result<Self> {
         let text = std::fs::read_to_string(path).unwrap_or_default();
-        let list: Self = toml::from_str(&text).with_context(|| path.display().to_string())?;
-        match list.known.iter().find(|known| known.reason.trim().is_empty()) {
-            Some(known) => {
-                bail!("{}: {:?}: reason: empty; say why no test notices them", path.display(), known.mutants)
-            }
-            None => Ok(list),
+        Self::parse(&text, mutants).with_context(|| path.display().to_string())
+    }
+
+    fn parse(text: &str, mutants: &[Mutant]) -> Result<Self> {
+        let mut list: Self = toml::from_str(text)?;
+        if let Some(known) = list.known.iter().find(|known| known.reason.trim().is_empty()) {
+            bail!("{:?}: reason: empty; say why no test notices them", known.mutants);
         }
+        let mut named: HashMap<String, Vec<&Mutant>> = HashMap::new();
+        for mutant in mutants {
+            let Mutant { file, what, function, source, .. } = mutant;
+            let short = format!("{file}: {what} in {function}");
+            named.entry(format!("{short} @ {source}")).or_default().push(mutant);
+            named.entry(short).or_default().push(mutant);
+        }
+        for all in named.values_mut() {
+            all.sort_by_key(|mutant| (mutant.line, mutant.column));
+        }
+        for name in list.known.iter().flat_map(|known| &known.mutants) {
+            list.numbers.extend(numbers(name, &named)?);
+        }
+        Ok(list)
     }
 
     pub fn has(&self, mutant: &Mutant) -> bool {
-        let Mutant { file, what, function, source, .. } = mutant;
-        let short = format!("{file}: {what} in {function}");
-        let long = format!("{short} @ {source}");
-        self.known.iter().flat_map(|known| &known.mutants).any(|name| *name == short || *name == long)
+        self.numbers.contains(&mutant.number)
     }
+}
+
+/// The numbers of the mutants that a name of the list has.
+fn numbers(name: &str, named: &HashMap<String, Vec<&Mutant>>) -> Result<Vec<u32>> {
+    let of = |name: &str| named.get(name).map_or(&[][..], Vec::as_slice);
+    let whole = of(name);
+    if let [one] = whole {
+        return Ok(vec![one.number]);
+    }
+    if let Some((name, place)) = name.rsplit_once(" #")
+        && let Ok(place) = place.parse::<usize>()
+    {
+        let place = place.checked_sub(1).and_then(|place| of(name).get(place));
+        return Ok(vec![place.with_context(|| format!("{name}: there are not so many of these"))?.number]);
+    }
+    let counted = name.strip_suffix(')').and_then(|name| name.rsplit_once(" (all "));
+    if let Some((name, count)) = counted
+        && let Ok(count) = count.parse::<usize>()
+    {
+        let all = of(name);
+        ensure!(all.len() == count, "{name}: there are {} of these, not {count}", all.len());
+        return Ok(all.iter().map(|mutant| mutant.number).collect());
+    }
+    ensure!(!whole.is_empty(), "{name}: there is no such mutant");
+    bail!("{name}: there are {} of these; say which, \" #K\", or \" (all {})\"", whole.len(), whole.len())
 }
 
 /// Counts of an area.

@@ -3,6 +3,7 @@
 use crate::build::{self, Program};
 use crate::changed;
 use crate::results::{Line, Outcome, Results};
+use crate::shards::{self, Head};
 use crate::tree::{self, Mutant, Tree};
 use crate::trials::{self, End, Trial};
 use crate::{Options, Places};
@@ -53,13 +54,17 @@ pub fn left_out(places: &Places, tree: &Tree) -> BTreeMap<u32, String> {
     tree.mutants.iter().filter_map(code).collect()
 }
 
-fn keep_left_out(places: &Places, tree: &Tree, left_out: &BTreeMap<u32, String>) -> Result<()> {
-    let named: BTreeMap<String, &String> = tree
-        .mutants
+/// The names of those that are left out.
+pub fn named(tree: &Tree, left_out: &BTreeMap<u32, String>) -> BTreeMap<String, String> {
+    tree.mutants
         .iter()
-        .filter_map(|mutant| Some((mutant.name(), left_out.get(&mutant.number)?)))
-        .collect();
-    Ok(std::fs::write(places.work.join("left-out.json"), serde_json::to_string_pretty(&named)?)?)
+        .filter_map(|mutant| Some((mutant.name(), left_out.get(&mutant.number)?.clone())))
+        .collect()
+}
+
+/// Writes the file of those that are left out.
+pub fn keep_named(places: &Places, named: &BTreeMap<String, String>) -> Result<()> {
+    Ok(std::fs::write(places.work.join("left-out.json"), serde_json::to_string_pretty(named)?)?)
 }
 
 /// Tries them all.
@@ -75,11 +80,11 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
         None => tree.mutants.iter().collect(),
     });
     let built = build::programs(&places.work, tree, &packages, &only, &mut left_out);
-    keep_left_out(places, tree, &left_out)?;
+    keep_named(places, &named(tree, &left_out))?;
     let programs = built?;
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;
     let trials = learnt(places, &programs, options)?;
-    let results = Results::open(&places.work.join("results.jsonl"))?;
+    let results = Results::open(&shards::file(places, options), Head::new(places, tree, options).as_ref())?;
     let mut open: Vec<&Mutant> = chosen(&tree.mutants, options)
         .into_iter()
         .filter(|mutant| !mutant.fixed && !left_out.contains_key(&mutant.number))

@@ -70,6 +70,15 @@ pub fn read(root: &Path) -> Result<Tree> {
 }
 
 impl Tree {
+    /// A hash of the sources of all mutants.
+    pub fn hash(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for mutant in &self.mutants {
+            (mutant.name(), mutant.hash).hash(&mut hasher);
+        }
+        hasher.finish()
+    }
+
     fn add(&mut self, root: &Path, file: &Path) -> Result<()> {
         let name = file.to_string_lossy().into_owned();
         if Area::of(&name).is_none() {

@@ -11,7 +11,7 @@
 //! | `flash [--board NAME] [--log]` | builds a board's image and flashes it with probe-rs |
 //! | `twin [SCENARIO] [--out DIR]` | builds that image and executes it against a model of its chip |
 //! | `fuzz [TARGET]… [--seconds N]` | coverage-guided fuzzing of the targets in `fuzz/` |
-//! | `mutants [--package NAME] [--shard K/N] [--sample N]` | mutation testing by cargo-mutants |
+//! | `mutants [--area NAME] [--shard K/N] [--sample N]` | mutation testing, by the program of `mutants/` |
 //!
 //! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran
 //! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
