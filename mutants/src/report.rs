@@ -13,8 +13,12 @@ use std::fmt::Write;
 /// Errors that say that the mutant is no program: types that do not fit, a trait that is not there, a missing arm.
 const UNVIABLE: [&str; 8] = ["E0277", "E0308", "E0369", "E0600", "E0599", "E0368", "E0282", "E0283"];
 
-/// Prints the table and writes a list of survivors for each area; `true` if all were tried, and all that survived are known.
-pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
+/// The counts of the areas, and their survivors that are not known.
+fn counted(
+    places: &Places,
+    tree: &Tree,
+    options: &Options,
+) -> Result<(BTreeMap<Area, Count>, BTreeMap<Area, String>)> {
     let results = Results::open(&shards::file(places, options), None)?;
     let known = KnownList::read(&places.root.join("mutants/known.toml"), &tree.mutants)?;
     let left_out = left_out(places, tree);
@@ -47,6 +51,12 @@ pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
             }
         }
     }
+    Ok((counts, survivors))
+}
+
+/// Prints the table and writes a list of survivors for each area; `true` if all were tried, and all that survived are known.
+pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
+    let (counts, survivors) = counted(places, tree, options)?;
     println!(
         "area            tests   late  bytes missed nobody   open | unviable elsewhere |  known | tests %  +bytes %"
     );

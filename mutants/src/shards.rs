@@ -210,7 +210,7 @@ mod tests {
             let (outcome, by) = (Outcome::Killed, String::new());
             results.add(&Line { name: mutant.name(), source: mutant.hash, outcome, by }).unwrap();
         }
-        run.merge(&[path.clone()]).unwrap();
+        run.merge(std::slice::from_ref(&path)).unwrap();
         let other = Head::new(&run.places, &run.tree, &run.options("--shard 0/1 --longest 3"));
         let error = Results::open(&path, other.as_ref()).err().unwrap().to_string();
         assert!(error.contains("of another run"), "{error}");
