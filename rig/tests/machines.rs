@@ -62,7 +62,8 @@ fn any_machine_folder_drives() {
     });
 }
 
-/// Carriers that are a whole number of control periods long, within a few ticks: samples alias with them, beats of some hertz included. And a rotor that speeds up.
+/// Carriers that are a whole number of control periods long, within a few ticks: samples alias with them, beats of some hertz
+/// included. And a rotor that speeds up.
 #[test]
 fn a_carrier_that_stands_still_against_the_samples_leaves_torque_alone() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");

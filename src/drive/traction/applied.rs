@@ -100,7 +100,8 @@ pub(super) fn limits(
     }
 }
 
-/// Samples in a carrier below which they may alias: of a whole number of them each always sees the same of the ripple, or wanders through it slowly.
+/// Samples in a carrier below which they may alias: of a whole number of them each always sees the same of the ripple, or
+/// wanders through it slowly.
 const FEW_SAMPLES: u32 = 11;
 
 /// `true` for a free carrier so fast that the samples' mean torque may not be the carrier's.
