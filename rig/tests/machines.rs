@@ -4,6 +4,7 @@ mod linear;
 
 use linear::{Linear, MACHINES};
 use rayon::prelude::*;
+use std::path::Path;
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recorded;
 
@@ -58,6 +59,32 @@ fn any_machine_folder_drives() {
         // At speeds and torques that this machine has.
         run("reversal");
         run("characteristic");
+    });
+}
+
+/// Carriers that are a whole number of control periods long, within a few ticks: samples alias with them, beats of some hertz
+/// included. And a rotor that speeds up.
+#[test]
+fn a_carrier_that_stands_still_against_the_samples_leaves_torque_alone() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");
+    let [toml, map] =
+        ["machine.toml", "flux_map.csv"].map(|file| std::fs::read_to_string(folder.join(file)).unwrap());
+    ["1000.0", "1250.0", "1666.0", "2000.0", "2500.0", "5000.0"].par_iter().for_each(|switching_hz| {
+        let own = tempfile::tempdir().unwrap();
+        let faster = toml.replace("max_switching_hz = 900.0", &format!("max_switching_hz = {switching_hz}"));
+        assert_ne!(faster, toml);
+        std::fs::write(own.path().join("machine.toml"), faster).unwrap();
+        std::fs::write(own.path().join("flux_map.csv"), &map).unwrap();
+        for line in ["load-steps", "steady --speed 300 --torque 1000", "start"] {
+            let chosen =
+                catalogue::of_traction(&format!("{line} --machine {}", own.path().display())).unwrap();
+            let machine = chosen.machine().unwrap();
+            let verdicts =
+                chosen.figures(&chosen.drive(&machine).unwrap(), &machine).get("verdicts").unwrap().clone();
+            for verdict in verdicts.as_array().unwrap() {
+                assert!(verdict["verdict"] == "pass", "{switching_hz} Hz: {line}: {verdict}");
+            }
+        }
     });
 }
 

@@ -264,7 +264,8 @@ impl ControlLaw for Controller {
         limits: &ModeLimits,
         law: &Law,
     ) -> VoltageVector {
-        let omega = self.speed.omega();
+        // Where there is no trim, nothing else makes up for a speed that lags.
+        let omega = if limits.ripple_share == 0.0 { self.speed.leading() } else { self.speed.omega() };
         let resistance = self.resistance_ohm(law.tables);
         let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
         let ahead = current_loop::ahead(sample, half_way, committed, &self.disturbance, resistance);

@@ -90,7 +90,8 @@ pub struct ModeLimits {
     pub steady_share: f32,
     /// The fundamental is to be that large, whatever the torque needs.
     pub filled: bool,
-    /// Flux ripple of the pattern, as a share of the fundamental flux, greater than zero.
+    /// Flux ripple of the pattern, as a share of the fundamental flux; zero where the samples do not tell what it does to the torque,
+    /// which then is not trimmed.
     pub ripple_share: f32,
     /// The pattern's flux is where it will stay; not while a switch between two patterns is still going on.
     pub settled: bool,

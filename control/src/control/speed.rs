@@ -6,12 +6,16 @@ use crate::frames::Angle;
 const NATURAL_RAD_S: f32 = 500.0;
 /// Control periods until the estimate is used.
 const SETTLING_STEPS: u32 = 200;
+/// Rate at which the lag of the estimate is smoothed, in rad/s.
+const LAG_RATE: f32 = 200.0;
 
 /// The speed and the angle that is followed, and how well.
 #[derive(Clone, Copy, Debug)]
 pub struct SpeedTracker {
     angle: Angle,
     omega: f32,
+    /// Speed that changes steadily less its estimate, smoothed, in rad/s.
+    lag: f32,
     /// Angles that were followed, until it has settled.
     steps: u32,
     natural_rad_s: f32,
@@ -33,7 +37,7 @@ impl SpeedTracker {
 
     /// With another natural frequency, in rad/s; well below the sampling rate.
     pub const fn with_natural(natural_rad_s: f32) -> Self {
-        Self { angle: Angle::ZERO, omega: 0.0, steps: 0, natural_rad_s, lost: false }
+        Self { angle: Angle::ZERO, omega: 0.0, lag: 0.0, steps: 0, natural_rad_s, lost: false }
     }
 
     /// The angle that the next sample should show.
@@ -63,6 +67,7 @@ impl SpeedTracker {
             }
         }
         let error = innovation.signed_radians();
+        self.lag += (2.0 * self.natural_rad_s * error - self.lag) * (LAG_RATE * period_s);
         self.omega += self.natural_rad_s * self.natural_rad_s * period_s * error;
         self.angle =
             measured - innovation + Angle::within_half_turn(2.0 * self.natural_rad_s * period_s * error);
@@ -91,6 +96,11 @@ impl SpeedTracker {
         self.omega
     }
 
+    /// Electrical angular speed of a rotor that speeds up or slows down steadily, in rad/s: its [estimate](Self::omega) lags.
+    pub fn leading(&self) -> f32 {
+        self.omega + self.lag
+    }
+
     /// The angle that is followed, at the newest sample.
     pub fn angle(&self) -> Angle {
         self.angle
@@ -104,5 +114,27 @@ impl SpeedTracker {
     /// `true` once so many angles have been followed that the speed can be used.
     pub fn is_settled(&self) -> bool {
         self.steps >= SETTLING_STEPS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rotor whose speed changes by 1,000 rad/s in a second: the estimate is 4 rad/s behind, and that is known.
+    #[test]
+    fn a_speed_that_changes_steadily_leads_the_estimate() {
+        for acceleration in [1_000.0, -1_000.0_f32] {
+            let (period_s, mut tracker, mut angle, mut omega) = (1e-4, SpeedTracker::new(), Angle::ZERO, 0.0);
+            for _ in 0..2_000 {
+                tracker.step(angle, period_s);
+                angle = angle + Angle::within_half_turn((omega + 0.5 * acceleration * period_s) * period_s);
+                omega += acceleration * period_s;
+            }
+            let speed = omega - acceleration * period_s;
+            let [behind, left] =
+                [tracker.omega(), tracker.leading()].map(|seen| (speed - seen) / acceleration);
+            assert!((behind - 4e-3).abs() < 1e-4 && left.abs() < 1e-4, "{behind} {left}");
+        }
     }
 }

@@ -36,7 +36,7 @@ pub struct Input {
     pub limited: bool,
     /// `true` if the demand itself is.
     pub short: bool,
-    /// Flux ripple over fundamental flux, greater than zero.
+    /// Flux ripple over fundamental flux; zero where the samples do not tell what it does.
     pub ripple_share: f32,
     pub largest_nm: f32,
     pub period_s: f32,
@@ -62,6 +62,9 @@ impl TorqueTrim {
         }
         if self.hold_s > 0.0 {
             self.hold_s -= input.period_s;
+            return;
+        }
+        if input.ripple_share == 0.0 {
             return;
         }
         let missing = input.demand_nm - input.measured_nm;
@@ -118,6 +121,30 @@ mod tests {
         assert_eq!(learned_nm(890.0, true, false), 0.0, "more would be of no use");
         assert!(learned_nm(910.0, true, false) < -10.0, "less is possible");
         assert_eq!(learned_nm(910.0, true, true), 0.0, "crests of the ripple");
+    }
+
+    /// A carrier that the samples do not tell the torque of.
+    #[test]
+    fn no_ripple_teaches_nothing_and_has_no_trim() {
+        let mut trim = TorqueTrim::new();
+        let mut learn = |ripple_share: f32| {
+            for _ in 0..1_100 {
+                trim.step(&Input {
+                    demand_nm: 900.0,
+                    measured_nm: 890.0,
+                    limited: false,
+                    short: false,
+                    ripple_share,
+                    largest_nm: LARGEST_NM,
+                    period_s: 1e-4,
+                });
+            }
+            [0.0, RIPPLE_SHARE].map(|share| trim.trim_nm(900.0, share, LARGEST_NM))
+        };
+        assert_eq!(learn(0.0), [0.0, 0.0]);
+        let learnt = learn(RIPPLE_SHARE);
+        assert!(learnt[0] == 0.0 && learnt[1] > 10.0, "{learnt:?}");
+        assert_eq!(learn(0.0), learnt);
     }
 
     /// A demand that changes by more than the largest torque in a second is one after which the loop is still at work.

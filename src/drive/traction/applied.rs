@@ -95,9 +95,19 @@ pub(super) fn limits(
         index_limit,
         steady_share: 1.0,
         filled,
-        ripple_share: ripple_share(trimmed, modulation_index),
+        ripple_share: if aliases(mode, settings) { 0.0 } else { ripple_share(trimmed, modulation_index) },
         settled: exit.is_settled(decision),
     }
+}
+
+/// Samples in a carrier below which they may alias: of a whole number of them each always sees the same of the ripple, or
+/// wanders through it slowly.
+const FEW_SAMPLES: u32 = 11;
+
+/// `true` for a free carrier so fast that the samples' mean torque may not be the carrier's.
+const fn aliases(mode: Mode, settings: &Settings) -> bool {
+    let Settings { devices, clock, .. } = settings;
+    matches!(mode, Mode::Async) && 2 * devices.shortest_half_ticks < FEW_SAMPLES * clock.control_ticks
 }
 
 /// The change of the link that is expected after the sample of a command, in V.
@@ -232,7 +242,20 @@ fn number(from: Mode, to: Mode, half: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modulation::CarrierHalf;
+    use crate::modulation::{CarrierHalf, SwitchLimits};
+    use crate::time::Clock;
+
+    #[test]
+    fn a_free_carrier_of_fewer_than_eleven_samples_aliases() {
+        let clock = Clock::new(25_000_000, 2_500);
+        let of = |mode: Mode, switching_hz: f32| {
+            aliases(mode, &Settings::new(clock, SwitchLimits::new(250, 0, switching_hz, &clock)))
+        };
+        for (switching_hz, does) in [(900.0, false), (909.0, false), (910.0, true), (10_000.0, true)] {
+            assert_eq!(of(Mode::Async, switching_hz), does, "{switching_hz} Hz");
+        }
+        assert!(!of(Mode::Sync15, 10_000.0), "its ripple is known");
+    }
 
     /// A pattern's ripple of a machine that turns backward is that of one that turns forward, upside down.
     #[test]
