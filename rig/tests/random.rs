@@ -1,6 +1,8 @@
 //! The random campaign: nothing escapes a part of it, and what it has found stays mended.
 
 use rayon::prelude::*;
+use std::path::Path;
+use std::process::Command;
 use tractive_rig::bench::{Limits, Observed, Peaks};
 use tractive_rig::campaign::drawn::Run;
 use tractive_rig::campaign::judge::Verdict;
@@ -40,6 +42,41 @@ fn nothing_escapes_random_runs_and_every_number_is_one() {
             assert!(worst.iter().all(|value| value.is_finite()), "{outcome:#?}");
         }
     }
+}
+
+/// Runs `campaign`; its exit code, and what it said of errors.
+fn campaign(words: &str, folder: &Path) -> (Option<i32>, String) {
+    let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+    let output = rig
+        .current_dir(folder)
+        .arg("campaign")
+        .args(words.split(' '))
+        .args(["--out", "out"])
+        .output()
+        .unwrap();
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn the_coverage_of_either_patterns_has_its_own_part_of_a_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("page.md");
+    let parts = ["random campaign", "random campaign, optimised patterns"];
+    let empty = parts.map(|part| format!("<!-- {part}: begin -->\n<!-- {part}: end -->\n"));
+    std::fs::write(&page, empty.concat()).unwrap();
+    for (runs, patterns) in [(2, "paper"), (3, "optimal")] {
+        let words = format!("--random {runs} --patterns {patterns} --doc page.md");
+        let check = format!("{words} --check-doc");
+        assert_eq!(campaign(&check, folder.path()), (Some(1), "page.md: not up to date\n".to_owned()));
+        assert_eq!(campaign(&words, folder.path()).0, Some(0), "{patterns}");
+        assert_eq!(campaign(&check, folder.path()).0, Some(0), "{patterns}");
+    }
+    let text = std::fs::read_to_string(&page).unwrap();
+    for (part, runs) in parts.iter().zip(["2 cases: ", "3 cases: "]) {
+        assert!(text.contains(&format!("<!-- {part}: begin -->\n{runs}")), "{text}");
+    }
+    let (code, said) = campaign("--fast --patterns optimal --doc page.md", folder.path());
+    assert!(code == Some(2) && said.starts_with("--doc: "), "{said}");
 }
 
 /// A run without a fault, motoring at a speed with half the torque.
