@@ -24,7 +24,7 @@ fn line<'a>(text: &'a str, words: &[&str]) -> &'a str {
     line
 }
 
-/// What stands between two words of a line; from there to its end without a second one.
+/// The part of a line between two words; without a second one all that follows.
 fn between<'a>(line: &'a str, from: &str, to: &str) -> &'a str {
     let (_, rest) = line.split_once(from).unwrap_or_else(|| panic!("{line} without {from}"));
     if to.is_empty() { rest } else { rest.split_once(to).unwrap_or_else(|| panic!("{line} without {to}")).0 }
