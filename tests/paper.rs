@@ -273,12 +273,30 @@ fn the_versions_are_those_of_the_lock_file() {
         }
     }
     assert!(ROOTS.iter().all(|root| there.iter().any(|(name, _)| name == root)), "{there:?}");
-    let list: Vec<String> = there.iter().map(|(name, version)| format!("`{name}` {version}")).collect();
+    // What has no source is the workspace's own.
+    let (own, others): (Vec<_>, Vec<_>) =
+        packages.iter().partition(|package| package.get("source").is_none());
+    let needs = own.iter().filter_map(|package| package.get("dependencies")?.as_array()).flatten();
+    let needs: BTreeSet<&str> = needs.filter_map(toml::Value::as_str).collect();
+    let others = others.iter().map(|package| (field(package, "name"), field(package, "version")));
+    let named = others
+        .filter(|(name, version)| needs.contains(&**name) || needs.contains(&*format!("{name} {version}")));
+    let of_host: BTreeSet<_> = named.filter(|package| !there.contains(package)).collect();
+    assert!(
+        ["proptest", "loom", "unicorn-engine"]
+            .iter()
+            .all(|tool| of_host.iter().any(|(name, _)| name == tool))
+    );
+    let list = |crates: &BTreeSet<(String, String)>| {
+        crates.iter().map(|(name, version)| format!("`{name}` {version}")).collect::<Vec<_>>().join(", ")
+    };
     let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
     let least = manifest["workspace"]["package"]["rust-version"].as_str().unwrap();
     let out = format!(
-        "Rust {least} or later. Of the images, with the macros that make a part of them: {}.\n",
-        list.join(", ")
+        "Rust {least} or later. Of the images, with the macros that make a part of them: {}.\n\n\
+        Of what makes and tests them on the host, as far as it is named here and not by another crate: {}.\n",
+        list(&there),
+        list(&of_host)
     );
     holds("docs/assessor.md", "versions", &out);
 }

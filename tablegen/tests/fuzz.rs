@@ -3,12 +3,15 @@
 //!
 //! `TRACTIVE_FUZZ_CASES=100000 cargo test --release -p tractive-tablegen --test fuzz` tries longer.
 
+#[path = "common/change.rs"]
+mod change;
 mod common;
 #[path = "../../fuzz/src/corpus.rs"]
 mod corpus;
 #[path = "../../fuzz/src/folder.rs"]
 mod folder;
 
+use change::{change, changed};
 use common::{Folder, good_map, good_toml};
 use folder::check_refusal;
 use proptest::prelude::*;
@@ -41,42 +44,6 @@ fn try_bytes(machine: &[u8], map: &[u8]) -> Result<(), TestCaseError> {
     let path = folder.path().display().to_string();
     prop_assert!(refused.starts_with(&path), "names no file: {}", refused);
     Ok(())
-}
-
-/// A change of a text: (where, how many bytes go, what comes).
-type Change = (prop::sample::Index, usize, Vec<u8>);
-
-fn change() -> impl Strategy<Value = Change> {
-    let odd = prop::sample::select(vec![
-        "nan",
-        "inf",
-        "-",
-        "1e309",
-        "0",
-        "-0",
-        "=",
-        ",",
-        "\n",
-        "\"",
-        "[",
-        "#",
-        "1e-300",
-        "\u{feff}",
-        "99999999999999999999",
-    ]);
-    let what =
-        prop_oneof![odd.prop_map(|text| text.as_bytes().to_vec()), prop::collection::vec(any::<u8>(), 0..6)];
-    (any::<prop::sample::Index>(), 0..12_usize, what)
-}
-
-fn changed(text: &str, changes: &[Change]) -> Vec<u8> {
-    let mut bytes = text.as_bytes().to_vec();
-    for (at, gone, what) in changes {
-        let from = at.index(bytes.len() + 1);
-        let to = (from + gone).min(bytes.len());
-        bytes.splice(from..to, what.iter().copied());
-    }
-    bytes
 }
 
 proptest! {

@@ -42,7 +42,10 @@ const TABLEGEN: &str = "tractive-tablegen";
 const TABLEGEN_PARTS: [&[&str]; 1] =
     [&["--lib", "--test", "patterns", "--test", "values", "--features", "patterns"]];
 const DRIVE: &str = "tractive";
-const DRIVE_PARTS: [&[&str]; 1] = [&["--test", "pinned", "--features", "optimal"]];
+const DRIVE_PARTS: [&[&str]; 2] = [
+    &["--test", "pinned", "--features", "optimal"],
+    &["--test", "proofs", "--features", "optimal", "compare_values"],
+];
 
 /// The rig, and the parts that it is tested in. Its own unit tests take a second, but all of it compiled once more: that is done without
 /// optimisation. The others take the library that `cargo rig` runs.

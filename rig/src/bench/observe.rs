@@ -20,16 +20,21 @@ pub struct Peaks {
 impl Peaks {
     /// Of an instant.
     pub fn at(currents_a: &[f64], id_a: f64, udc_v: f64, uc_v: f64) -> Self {
-        let current_a = currents_a.iter().fold(0.0_f64, |most, current| most.max(current.abs()));
+        let current_a = currents_a.iter().fold(0.0, |most, current| larger(most, current.abs()));
         Self { current_a, lowest_id_a: id_a.min(0.0), udc_v, uc_v }
     }
 
     fn note(&mut self, now: &Self) {
-        self.current_a = self.current_a.max(now.current_a);
+        self.current_a = larger(self.current_a, now.current_a);
         self.lowest_id_a = self.lowest_id_a.min(now.lowest_id_a);
-        self.udc_v = self.udc_v.max(now.udc_v);
-        self.uc_v = self.uc_v.max(now.uc_v);
+        self.udc_v = larger(self.udc_v, now.udc_v);
+        self.uc_v = larger(self.uc_v, now.uc_v);
     }
+}
+
+/// The larger one; what is no number stays, so that somebody sees it.
+fn larger(most: f64, now: f64) -> f64 {
+    if most.is_nan() || now <= most { most } else { now }
 }
 
 /// The limits that a sound plant keeps to: beyond them a fault makes a difference.

@@ -6,8 +6,9 @@ use super::{Campaign, Case, Outcome, healthy, random, report};
 use crate::ablation::Ablation;
 use crate::files::make_folder;
 use crate::run::bar;
+use crate::scenario::traction::PatternsName;
 use crate::shards::{self, Merged, Plan};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::ExitCode;
@@ -23,6 +24,11 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     if let Some(runs) = options.random {
         return random::command::run(runs, options);
     }
+    let is_usual = options.patterns == PatternsName::Paper;
+    ensure!(
+        options.doc.is_none() || is_usual,
+        "--doc: of other patterns the campaign at random alone has a part"
+    );
     let cases = cases(options)?;
     let given = serde_json::json!({
         "fast": options.fast,

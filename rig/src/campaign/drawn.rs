@@ -31,6 +31,8 @@ pub struct Drawn {
     pub seed: u64,
     /// The modes that it went through, with > between.
     pub modes: String,
+    /// The source of the current reference when the fault came, or that there were no pulses.
+    pub region: String,
     /// Its values, in the order of the dimensions.
     pub values: Vec<f64>,
 }

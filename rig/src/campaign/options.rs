@@ -25,8 +25,8 @@ pub struct CampaignOptions {
     #[arg(long, default_value = "target/tractive/campaign")]
     pub out: PathBuf,
     /// A document whose generated part is written anew: the tables of the fast campaign, the totals of the full one, the coverage of the
-    /// random one.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "without", "patterns"])]
+    /// random one, of each patterns its own.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "without"])]
     pub doc: Option<PathBuf>,
     /// The document is not written: whether it is up to date decides on the exit code.
     #[arg(long, requires = "doc")]

@@ -126,6 +126,24 @@ impl Outcome {
         since_fault_ms,current_until_a,current_after_a,current_limit_a,udc_until_v,udc_after_v,udc_limit_v,\
         uc_until_v,uc_after_v,uc_limit_v,lowest_id_a,torque_error_nm,why";
 
+    /// All its numbers.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        let always = [
+            self.speed_rpm,
+            self.current_until_a,
+            self.current_after_a,
+            self.current_limit_a,
+            self.udc_until_v,
+            self.udc_after_v,
+            self.udc_limit_v,
+            self.lowest_id_a,
+            self.torque_error_nm,
+        ];
+        let times = [self.carrier_periods, self.time_ms, self.since_fault_ms];
+        let of_zs9 = [self.uc_until_v, self.uc_after_v, self.uc_limit_v];
+        always.into_iter().chain(times.into_iter().chain(of_zs9).flatten())
+    }
+
     /// The line of a case.
     pub fn new<C>(setting: &Setting, fault: &Named<C>, seen: &Seen, allowed: Allowed) -> Self {
         let Seen { observed, trip, torque_error_nm, tick_s, carrier_s } = seen;

@@ -97,7 +97,11 @@ pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
     let mut good = finish(&merged, &options.out)?;
     if let Some(path) = &options.doc {
         let text = coverage(&Run::of(&merged)?);
-        let same = renew_with(path, Part::Coverage, &text, options.check_doc)?;
+        let part = match options.patterns {
+            PatternsName::Paper => Part::Coverage,
+            PatternsName::Optimal => Part::OptimalCoverage,
+        };
+        let same = renew_with(path, part, &text, options.check_doc)?;
         if options.check_doc && !same {
             eprintln!("{}: not up to date", path.display());
             good = false;

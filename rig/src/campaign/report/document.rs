@@ -16,6 +16,8 @@ pub enum Part {
     Sentences,
     /// The coverage of the random campaign.
     Coverage,
+    /// The same with the optimised patterns.
+    OptimalCoverage,
 }
 
 impl Part {
@@ -25,6 +27,10 @@ impl Part {
             Self::Tables => ["<!-- campaign: begin -->\n", "<!-- campaign: end -->"],
             Self::Sentences => ["<!-- full campaign: begin -->\n", "<!-- full campaign: end -->"],
             Self::Coverage => ["<!-- random campaign: begin -->\n", "<!-- random campaign: end -->"],
+            Self::OptimalCoverage => [
+                "<!-- random campaign, optimised patterns: begin -->\n",
+                "<!-- random campaign, optimised patterns: end -->",
+            ],
         }
     }
 

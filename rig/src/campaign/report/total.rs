@@ -12,7 +12,7 @@ pub struct Total {
     /// The counts of their ends.
     #[serde(flatten)]
     pub tally: Tally,
-    /// The phase current that is allowed unless a failed device forces more, in A.
+    /// The phase current that was allowed in the very case whose current, not forced by a failed device, was largest, in A.
     pub current_limit_a: f64,
     /// The worst case of each quantity, by name.
     #[serde(flatten)]
@@ -67,7 +67,10 @@ fn worst<'a>(outcomes: impl Iterator<Item = &'a Outcome>, value: impl Fn(&Outcom
 /// Of one system; `None` without cases.
 pub fn total(outcomes: &[Outcome], system: &str) -> Option<Total> {
     let of = || outcomes.iter().filter(|outcome| outcome.system == system);
-    let current_limit_a = of().map(|outcome| outcome.current_limit_a).reduce(f64::min)?;
+    of().next()?;
+    let own = of().filter(|outcome| !outcome.is_forced());
+    let largest = own.max_by(|a, b| a.worst_current_a().total_cmp(&b.worst_current_a()));
+    let current_limit_a = largest.map_or(0.0, |outcome| outcome.current_limit_a);
     let worst = QUANTITIES.into_iter().map(|(name, .., value)| (name, worst(of(), value))).collect();
     Some(Total { tally: Tally::of(of()), current_limit_a, worst })
 }

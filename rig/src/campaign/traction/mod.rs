@@ -27,11 +27,13 @@ use crate::scenario::System;
 use crate::scenario::traction::{PatternsName, Traction};
 use crate::trace::Row;
 use anyhow::Result;
+use core::cell::Cell;
 pub use faults::{Cause, faults};
-use tractive::control::Demand;
+use tractive::control::{ControlLaw, Demand, Region};
 use tractive::drive::traction::Settings;
 use tractive::machine::Tables;
 use tractive::modulation::{Ladder, Mode, SwitchLimits};
+use tractive::time::Instant;
 
 /// Full torque is reversed in 0.15 s where it cannot step; the aftermath is several electrical turns, and the link's oscillation.
 const STAGES: Stages = Stages { torque_s: -0.09, turn_s: 0.1, end_s: 0.3, aftermath_s: 0.06 };
@@ -43,6 +45,14 @@ const TRACE_STEP_S: f64 = 50e-6;
 const PUSH_RPM_S: f64 = 2_000.0;
 /// The acceleration of a rotor that runs away, in r/min per s: twice what the machine itself can do.
 const RUNAWAY_RPM_S: f64 = 12_000.0;
+
+/// The way of a run.
+struct Way {
+    /// The modes that it went through.
+    modes: Vec<Mode>,
+    /// The source of the current reference at the last control interrupt before the fault.
+    region: Region,
+}
 
 /// The drive, with one protection off or none.
 pub struct Drive {
@@ -75,18 +85,24 @@ impl Drive {
 
     /// Runs one case.
     pub fn run(&self, case: &Case) -> Result<Outcome> {
-        Ok(self.run_watched(case)?.0)
+        match case.fault.cause {
+            Cause::Sensor(place, wire) => self.run_sensor(case, place, wire),
+            _ => Ok(self.run_watched(case)?.0),
+        }
     }
 
-    /// Runs one case; the modes that it went through, too.
-    fn run_watched(&self, case: &Case) -> Result<(Outcome, Vec<Mode>)> {
-        if let Cause::Sensor(place, wire) = case.fault.cause {
-            return self.run_sensor(case, place, wire);
-        }
+    /// Runs one case that is none of a temperature sensor; the way that it went, too.
+    fn run_watched(&self, case: &Case) -> Result<(Outcome, Way)> {
         let mut bench = self.bench(case);
         let devices = self.devices(case.conditions.dead_time_ticks);
-        let mut tasks = self.tasks(devices);
         let tick_s = f64::from(CLOCK.tick_s);
+        let fault = Instant(((LEAD_S + case.at_s) / tick_s) as u32);
+        let region = Cell::new(Region::Mtpa);
+        let mut tasks = self.tasks(devices).doing(|law, now, _| {
+            if fault.reached(now) {
+                region.set(law.target().region);
+            }
+        });
         tasks.drive(&mut bench, |bench| {
             let safe_s = bench.observed.safe.map(|(at, _)| at as f64 * tick_s - LEAD_S);
             safe_s.is_none_or(|safe_s| bench.time_s() < safe_s + STAGES.aftermath_s)
@@ -113,7 +129,7 @@ impl Drive {
         let allowed = self.allowed(case, &seen, last_torque_nm(rows));
         let mut modes: Vec<Mode> = rows.iter().map(|row| row.mode).collect();
         modes.dedup();
-        Ok((Outcome::new(&setting, &case.fault, &seen, allowed), modes))
+        Ok((Outcome::new(&setting, &case.fault, &seen, allowed), Way { modes, region: region.get() }))
     }
 
     fn devices(&self, dead_time_ticks: u32) -> SwitchLimits {
@@ -121,7 +137,7 @@ impl Drive {
         SwitchLimits::new(250, dead_time_ticks, carrier_hz, &CLOCK)
     }
 
-    fn tasks(&self, devices: SwitchLimits) -> Tasks<'static> {
+    fn tasks<'a>(&self, devices: SwitchLimits) -> Tasks<'a> {
         let settings = Settings::new(CLOCK, devices);
         Tasks::new(self.tables, settings, devices.shortest_half_ticks).on(self.ladder).without(self.without)
     }

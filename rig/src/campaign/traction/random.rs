@@ -2,7 +2,7 @@
 
 use super::cases::{Point, RUNAWAY_FROM_RPM};
 use super::faults::{Cause, faults};
-use super::{Case, Conditions, Drive, STAGES};
+use super::{Case, Conditions, Drive, STAGES, Way};
 use crate::bench::Flaws;
 use crate::campaign::Action;
 use crate::campaign::action::LEAD_S;
@@ -52,6 +52,8 @@ const RIPPLE_HZ: f64 = 300.0;
 const SOUND_SHARE: f64 = 0.3;
 /// Below this speed a wrong angle cannot be told from a rotor that stands, in r/min.
 const SLOWEST_RPM: f64 = 100.0;
+/// The region of a run that had no pulses when its fault came.
+const NO_PULSES: &str = "no pulses";
 /// The coordinate of the action from which there is no torque.
 const COASTING_FROM: f64 = 0.9;
 
@@ -180,8 +182,12 @@ impl Drive {
     /// Runs the case of some values.
     pub fn run_values(&self, run: usize, values: &[f64], seed: u64) -> Result<Run> {
         let case = self.case(values, seed)?;
-        let (outcome, modes) = self.run_watched(&case)?;
+        let (outcome, Way { modes, region }) = self.run_watched(&case)?;
         let modes: Vec<_> = modes.into_iter().map(Mode::name).collect();
-        Ok(Run { outcome, drawn: Drawn { run, seed, modes: modes.join(">"), values: values.to_vec() } })
+        let region = if outcome.mode == Mode::Off.name() { NO_PULSES } else { region.name() }.to_owned();
+        Ok(Run {
+            outcome,
+            drawn: Drawn { run, seed, modes: modes.join(">"), region, values: values.to_vec() },
+        })
     }
 }

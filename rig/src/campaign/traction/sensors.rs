@@ -39,7 +39,7 @@ pub(super) fn longest_s(carrier_s: f64, safe: Option<SafeState>, turn_s: f64) ->
 
 impl Drive {
     /// One case of a sensor's wire: of the winding (0) or of the heat sink (1).
-    pub(super) fn run_sensor(&self, case: &Case, place: usize, wire: Wire) -> Result<(Outcome, Vec<Mode>)> {
+    pub(super) fn run_sensor(&self, case: &Case, place: usize, wire: Wire) -> Result<Outcome> {
         let devices = self.devices(0);
         let ratings = &self.machine.tables.ratings;
         let LineFilter { capacitance_f, .. } = LineFilter::TRACTION;
@@ -66,9 +66,7 @@ impl Drive {
         let (speed_rpm, action) = (case.point.speed_rpm, case.action);
         let setting = Setting { system: "pmasynrm", mode: mode.name(), speed_rpm, action };
         let allowed = self.allowed(case, &seen, last_torque_nm(rows));
-        let mut modes: Vec<Mode> = rows.iter().map(|row| row.mode).collect();
-        modes.dedup();
-        Ok((Outcome::new(&setting, &case.fault, &seen, allowed), modes))
+        Ok(Outcome::new(&setting, &case.fault, &seen, allowed))
     }
 
     fn sensor_bench(&self, case: &Case, place: usize, wire: Wire) -> Bench {
