@@ -6,16 +6,14 @@ use crate::frames::Angle;
 const NATURAL_RAD_S: f32 = 500.0;
 /// Control periods until the estimate is used.
 const SETTLING_STEPS: u32 = 200;
-/// Rate at which the lag of the estimate is smoothed, in rad/s.
-const LAG_RATE: f32 = 200.0;
 
 /// The speed and the angle that is followed, and how well.
 #[derive(Clone, Copy, Debug)]
 pub struct SpeedTracker {
     angle: Angle,
     omega: f32,
-    /// Speed that changes steadily less its estimate, smoothed, in rad/s.
-    lag: f32,
+    /// By how much the newest angle was ahead of the one that was expected, in rad.
+    ahead_rad: f32,
     /// Angles that were followed, until it has settled.
     steps: u32,
     natural_rad_s: f32,
@@ -37,7 +35,7 @@ impl SpeedTracker {
 
     /// With another natural frequency, in rad/s; well below the sampling rate.
     pub const fn with_natural(natural_rad_s: f32) -> Self {
-        Self { angle: Angle::ZERO, omega: 0.0, lag: 0.0, steps: 0, natural_rad_s, lost: false }
+        Self { angle: Angle::ZERO, omega: 0.0, ahead_rad: 0.0, steps: 0, natural_rad_s, lost: false }
     }
 
     /// The angle that the next sample should show.
@@ -67,7 +65,7 @@ impl SpeedTracker {
             }
         }
         let error = innovation.signed_radians();
-        self.lag += (2.0 * self.natural_rad_s * error - self.lag) * (LAG_RATE * period_s);
+        self.ahead_rad = error;
         self.omega += self.natural_rad_s * self.natural_rad_s * period_s * error;
         self.angle =
             measured - innovation + Angle::within_half_turn(2.0 * self.natural_rad_s * period_s * error);
@@ -98,7 +96,7 @@ impl SpeedTracker {
 
     /// Electrical angular speed of a rotor that speeds up or slows down steadily, in rad/s: its [estimate](Self::omega) lags.
     pub fn leading(&self) -> f32 {
-        self.omega + self.lag
+        self.omega + 2.0 * self.natural_rad_s * self.ahead_rad
     }
 
     /// The angle that is followed, at the newest sample.
