@@ -203,7 +203,8 @@ impl Course {
         self.zero.turn(back_share, mean.d / bound_a, seen.length_s);
         let drop = self.drop_v(mean, seen.frame);
         let learns = change.squared() > (LEARNT_SHARE * bound_a) * (LEARNT_SHARE * bound_a);
-        if learns && self.stage != Stage::Probe {
+        // Where a current stands still its changes tell little.
+        if learns && !matches!(self.stage, Stage::Probe | Stage::Rest | Stage::Turn | Stage::Done) {
             inductance.learn(change, seen.acted - drop * seen.length_s, NOISE_SHARE * bound_a);
         }
         let [along_d, along_q] = match self.stage {
