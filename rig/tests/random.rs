@@ -152,12 +152,12 @@ fn trip_levels_are_those_of_what_is_read() {
 /// pulses a turn. Of ten thousand with these, square wave that takes over at 294 Hz without torque, on a high link, and torque that
 /// falls to none at a small modulation index, where one phase at a time has edges, and there is less flux linkage than by the map; and pulses that begin where three
 /// pulses are filled up to nearly the whole. Of ten thousand with
-/// the paper's and another seed, torque that is reversed when seven pulses are already announced.
+/// the paper's and another seed, torque that is reversed when seven pulses are already announced. A sensor's error of which the converters' steps hide the last part.
 #[test]
 fn what_large_campaigns_found_stays_mended() {
     const FOUND: [(usize, u64, PatternsName, &[usize]); 5] = [
         (1_000, 1, PatternsName::Paper, &[167, 484, 680]),
-        (10_000, 1, PatternsName::Paper, &[4619, 5142, 7805, 8012, 9721]),
+        (10_000, 1, PatternsName::Paper, &[996, 4619, 5142, 7805, 8012, 9721]),
         (10_000, 3, PatternsName::Paper, &[3917]),
         (10_000, 1, PatternsName::Optimal, &[217, 1437, 3390, 5006, 5197]),
         (3_000, 1, PatternsName::Optimal, &[93, 570, 996, 2073, 2775]),

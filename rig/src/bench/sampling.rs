@@ -10,9 +10,9 @@ use tractive::protection::LegFaults;
 use tractive::time::Instant;
 
 /// The error of a current's reading that makes no difference which counts, in A: a tenth of the machine's largest current,
-/// which is what the sum of the phases may be. On top comes so many times the sum's own noise, in which it does not show.
+/// which is what the sum of the phases may be. On top comes so many times the sum's own noise, and the converters' steps, in which it does not show.
 const MUCH_A: f32 = 23.3;
-const HIDDEN: f32 = 3.0;
+const HIDDEN_NOISES: f64 = 3.0;
 
 /// A control sample with what comes beside it.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +78,7 @@ impl Bench {
     fn read_currents(&mut self, true_a: Abc) -> Abc {
         let read_a = self.spoiler.currents(self.time.now_s(), true_a);
         let off = [read_a.a - true_a.a, read_a.b - true_a.b, read_a.c - true_a.c];
-        let much_a = MUCH_A + HIDDEN * self.sensors.sum_noise_a();
+        let much_a = MUCH_A + self.sensors.hidden_a(HIDDEN_NOISES);
         // What is not a number is off as well.
         if off.iter().any(|off| off.is_nan() || off.abs() > much_a) {
             self.observed.makes_a_difference(self.time.now);

@@ -134,11 +134,16 @@ impl Converter {
         {
             value += noise.sample(&mut self.random);
         }
-        if let Some(bits) = self.flaws.adc_bits {
-            let step = 2.0 * self.flaws.adc_full_scale_a / f64::from(bits).exp2();
+        if self.flaws.adc_bits.is_some() {
+            let step = self.step_a();
             value = (value / step).round() * step;
         }
         value
+    }
+
+    /// A step of a current converter, in A; 0 without steps.
+    fn step_a(&self) -> f64 {
+        self.flaws.adc_bits.map_or(0.0, |bits| 2.0 * self.flaws.adc_full_scale_a / f64::from(bits).exp2())
     }
 
     /// A motor's phase currents as converted now, in A.
@@ -195,9 +200,10 @@ impl Sensors {
         Self { udc_v, link_steps, converter: Converter::new(flaws), encoder: None, told_a: Abc::default() }
     }
 
-    /// Noise of the sum of three phase currents as they are read, rms, in A.
-    pub fn sum_noise_a(&self) -> f32 {
-        (3.0_f64.sqrt() * self.converter.flaws.noise_a) as f32
+    /// The part of the sum of three phase currents that does not show in what is read, in A: so many times its noise, and half a step of each converter.
+    pub fn hidden_a(&self, noises: f64) -> f32 {
+        let Flaws { noise_a, .. } = self.converter.flaws;
+        (noises * 3.0_f64.sqrt() * noise_a + 1.5 * self.converter.step_a()) as f32
     }
 
     /// The same with an incremental encoder, if there is one.
