@@ -32,13 +32,10 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.controller.observe(&here, tables);
         self.revises = self.is_to_revise(slot.now, &input.command.demand);
         let commands = slot.commands || self.revises;
-        let served = self.aimed.filter(|aimed| aimed.serves(&slot.key, &self.settings.clock));
+        let served = || self.aimed.filter(|aimed| aimed.serves(&slot.key, &self.settings.clock));
         // A pattern's last half has a point of its own.
-        let aims = if slot.aims {
-            served.is_none_or(|aimed| aimed.after != slot.key.after)
-        } else {
-            commands && served.is_none()
-        };
+        let aims = (slot.aims || commands)
+            && served().is_none_or(|aimed| slot.aims && aimed.after != slot.key.after);
         let slices_fold = slot.between > 0;
         // Not in the longest periods, either.
         if !aims || slices_fold {
