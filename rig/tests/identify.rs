@@ -489,7 +489,7 @@ fn much_saturation_keeps_the_bound_of_current() {
     });
 }
 
-/// Where a current stands still its changes are noise: the law learns nothing of them, and the turning rotor's current stays where it is wanted, at 0.32
+/// Changes of a current that stands still are noise: the law learns nothing of them, and the turning rotor's current stays where it is wanted, at 0.32
 /// of the bound. Iron whose L_q keeps 0.35 of itself: what noise had taught let it go to 1.87 of the bound, which is a fault.
 #[test]
 fn the_turning_rotors_current_stays_where_it_is_wanted() {

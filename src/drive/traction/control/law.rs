@@ -3,7 +3,7 @@
 use super::super::applied::{Ahead, Steady, Wanted, committed, follows, interval_s, limits, passed};
 use super::super::current_delay::CurrentDelay;
 use super::super::pulses::Half;
-use super::super::slot::Slot;
+use super::super::slot::{Decision, Slot};
 use super::super::{Settings, Shared};
 use super::{ControlTask, Input};
 use crate::control::{
@@ -33,9 +33,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.revises = self.is_to_revise(slot.now, &input.command.demand);
         let commands = slot.commands || self.revises;
         let served = || self.aimed.filter(|aimed| aimed.serves(&slot.key, &self.settings.clock));
-        // A pattern's last half has a point of its own.
-        let aims = (slot.aims || commands)
-            && served().is_none_or(|aimed| slot.aims && aimed.after != slot.key.after);
+        // A pattern's last half has a point of its own, and so has a boundary whose point was made early, after a jump.
+        let is_old = |aimed: Decision| aimed.boundary == slot.key.boundary || aimed.after != slot.key.after;
+        let aims = (slot.aims || commands) && served().is_none_or(|aimed| slot.aims && is_old(aimed));
         let slices_fold = slot.between > 0;
         // Not in the longest periods, either.
         if !aims || slices_fold {
