@@ -18,6 +18,9 @@ pub trait ControlLaw {
     /// done to the voltage.
     const FEEDS_POWER_FORWARD: bool = true;
 
+    /// `true` if an operating point may serve several boundaries that are near each other; `false` where each has one of its own.
+    const POINT_SERVES: bool = true;
+
     /// The follower of the angle.
     fn tracker(&self) -> &SpeedTracker;
 

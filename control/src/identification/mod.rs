@@ -108,6 +108,9 @@ impl Default for Identification {
 }
 
 impl ControlLaw for Identification {
+    // Its operating point is the experiment's next step.
+    const POINT_SERVES: bool = false;
+
     fn tracker(&self) -> &SpeedTracker {
         &self.speed
     }

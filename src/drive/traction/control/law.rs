@@ -32,10 +32,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.controller.observe(&here, tables);
         self.revises = self.is_to_revise(slot.now, &input.command.demand);
         let commands = slot.commands || self.revises;
-        let served = || self.aimed.filter(|aimed| aimed.serves(&slot.key, &self.settings.clock));
+        let is_own = |aimed: &Decision| aimed.boundary == slot.key.boundary;
+        let serves = |aimed: &Decision| aimed.serves(&slot.key, &self.settings.clock);
+        let served = || self.aimed.filter(|aimed| serves(aimed) && (L::POINT_SERVES || is_own(aimed)));
         // A pattern's last half has a point of its own, and so has a boundary whose point was made early, after a jump.
-        let is_old = |aimed: Decision| aimed.boundary == slot.key.boundary || aimed.after != slot.key.after;
-        let aims = (slot.aims || commands) && served().is_none_or(|aimed| slot.aims && is_old(aimed));
+        let is_old = |aimed: &Decision| is_own(aimed) || aimed.after != slot.key.after;
+        let aims = (slot.aims || commands) && served().is_none_or(|aimed| slot.aims && is_old(&aimed));
         let slices_fold = slot.between > 0;
         // Not in the longest periods, either.
         if !aims || slices_fold {
