@@ -1,7 +1,7 @@
 //! The control law's state, and its stages.
 //!
 //! Nothing is computed that nobody uses: each control period follows the rotor and takes its sample into the mean torque; the
-//! operating point is made once for each command, and the voltage once.
+//! operating point is made once for each command or for some that are near each other, and the voltage once for each.
 
 use super::speed::SpeedTracker;
 use super::{

@@ -12,13 +12,14 @@ use crate::time::Clock;
 /// drive's.
 ///
 /// Each control period follows the angle; while pulses are made it then observes its sample, and learns at a boundary that has passed. The
-/// operating point is made once for each command, and the voltage once.
+/// operating point is made once for each command or for some that are near each other, and the voltage once for each.
 pub trait ControlLaw {
     /// `true` if a link that is controlled, as a Z-source's, is told the motors' power beforehand; otherwise its control sees what that power has
     /// done to the voltage.
     const FEEDS_POWER_FORWARD: bool = true;
 
-    /// `true` if an operating point may serve several boundaries that are near each other; `false` where each has one of its own.
+    /// `true` if an operating point may serve several boundaries within three control periods; `false` where each needs one of its own, as a law whose
+    /// [`ControlLaw::aim`] takes a step each time.
     const POINT_SERVES: bool = true;
 
     /// The follower of the angle.
@@ -110,7 +111,8 @@ pub trait ControlLaw {
     /// Passes a carrier boundary where nothing is learnt, as the next one learns for both.
     fn pass(&mut self, _sample: &RotorSample) {}
 
-    /// Makes the operating point, once for each command; call after [`ControlLaw::observe`].
+    /// Makes the operating point, before the first command that it serves: one for each, or for several where [`ControlLaw::POINT_SERVES`]; call after
+    /// [`ControlLaw::observe`].
     fn aim(&mut self, input: &AimInput, law: &Law);
 
     /// The voltage for the carrier half that begins at the horizon, from the newest sample.
