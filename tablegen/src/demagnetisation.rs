@@ -2,6 +2,7 @@
 
 use crate::weakening::at_id;
 use crate::{InputError, MachineFolder, Optimum, Parameters, SmoothMap};
+use libm::hypot;
 use std::f64::consts::{FRAC_2_PI, TAU};
 use std::path::Path;
 
@@ -83,8 +84,8 @@ fn highest_id_a(point: &Point, map: &SmoothMap, parameters: &Parameters) -> Opti
         let volts =
             (resistance * id - point.omega * flux.psi_q_wb, resistance * iq + point.omega * flux.psi_d_wb);
         optimum.torque_nm(id, iq) >= point.torque_nm * (1.0 - 1e-9)
-            && id.hypot(iq) <= most_a * (1.0 + 1e-9)
-            && volts.0.hypot(volts.1) <= point.voltage_v
+            && hypot(id, iq) <= most_a * (1.0 + 1e-9)
+            && hypot(volts.0, volts.1) <= point.voltage_v
     };
     let mut tried: Vec<f64> = (0..=STEPS).map(|k| -most_a * k as f64 / STEPS as f64).collect();
     // The only one at the largest current.

@@ -11,6 +11,7 @@
 //!
 //! and the firmware takes them in with `mod machine { include!(concat!(env!("OUT_DIR"), "/machine.rs")); }`. A program on a host
 //! makes them at run time, with [`MachineFolder::tables`].
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 #![forbid(unsafe_code)]
 
 mod axis;

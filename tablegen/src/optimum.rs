@@ -1,6 +1,7 @@
 //! The true optimum on the smooth map: the least current for a torque.
 
 use crate::{Parameters, SmoothMap};
+use libm::{asin, cos, sin};
 
 /// Searches on the smooth map.
 pub struct Optimum<'a> {
@@ -35,9 +36,9 @@ impl<'a> Optimum<'a> {
 
     /// The most torque of a current magnitude, and its angle from the q axis towards −d, in rad.
     fn at_magnitude(&self, current_a: f64) -> (f64, f64) {
-        let torque = |angle: f64| self.torque_nm(-current_a * angle.sin(), current_a * angle.cos());
+        let torque = |angle: f64| self.torque_nm(-current_a * sin(angle), current_a * cos(angle));
         // The optimum lies on the other side of the q axis for a machine with L_d > L_q.
-        let most_rad = (-self.least_id_a / current_a).min(1.0).asin();
+        let most_rad = asin((-self.least_id_a / current_a).min(1.0));
         let angle = largest(-std::f64::consts::FRAC_PI_4, most_rad, torque);
         (torque(angle), angle)
     }
@@ -58,7 +59,7 @@ impl<'a> Optimum<'a> {
             if self.at_magnitude(middle).0 < torque_nm { low = middle } else { high = middle }
         }
         let (_, angle) = self.at_magnitude(high);
-        (-high * angle.sin(), high * angle.cos())
+        (-high * sin(angle), high * cos(angle))
     }
 }
 

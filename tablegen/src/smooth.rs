@@ -2,6 +2,7 @@
 
 use crate::map::FluxMap;
 use core::ops::{Add, Mul};
+use libm::hypot;
 
 /// Flux linkage at a current, with its Jacobian.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -93,7 +94,7 @@ impl SmoothMap {
             let (dd, dq) = ((at.lqq_h * ed - at.ldq_h * eq) / det, (at.ldd_h * eq - at.lqd_h * ed) / det);
             // A long step crosses the knee of saturation; shorter ones find it.
             let longest = 4.0 * self.step_d.max(self.step_q);
-            let scale = (longest / dd.hypot(dq)).min(1.0);
+            let scale = (longest / hypot(dd, dq)).min(1.0);
             (id, iq) = (id + scale * dd, iq + scale * dq);
         }
         None

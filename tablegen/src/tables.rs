@@ -3,6 +3,7 @@
 use crate::axis::{Axis, curve, grid};
 use crate::weakening_tables::{MtpaCurrents, weakening_tables};
 use crate::{FluxMap, Iron, MachineFolder, Optimum, Parameters, SmoothMap};
+use libm::hypot;
 use tractive_control::machine::{IronLoss, Mtpa, Ratings, Tables};
 
 /// Nodes of the universal curve.
@@ -23,7 +24,7 @@ impl MachineFolder {
         let currents = CurrentGrid::new(map);
         let top = optimum.least_current(parameters.max_torque_nm);
         let top_flux = smooth.at(top.0, top.1);
-        let top_flux_wb = top_flux.psi_d_wb.hypot(top_flux.psi_q_wb);
+        let top_flux_wb = hypot(top_flux.psi_d_wb, top_flux.psi_q_wb);
         let regular = Regular {
             psi_f_wb: REGULAR_SHARE * top_flux_wb,
             saliency_h: REGULAR_SHARE * top_flux.psi_q_wb.abs() / top.1.abs().max(1e-9),

@@ -1,6 +1,7 @@
 //! Field weakening: constant-torque curves cut with circles of constant flux linkage.
 
 use crate::{MachineFolder, Optimum, SmoothMap};
+use libm::{cos, hypot, sin};
 
 /// One circle.
 pub struct Circle {
@@ -33,7 +34,7 @@ pub fn circle(
     let optimum = Optimum::new(map, &machine.parameters);
     let highest_id = machine.map.id_a[machine.map.id_a.len() - 1];
     let least_id_a = machine.parameters.least_id_a();
-    let within = |point: &Point| point.id.hypot(point.iq) <= max_current_a && point.id >= least_id_a;
+    let within = |point: &Point| hypot(point.id, point.iq) <= max_current_a && point.id >= least_id_a;
     let arc = rising_arc(psi_wb, map, &optimum, within);
     let Some(top) = arc.last().copied() else {
         // No current within the limit has this flux: nothing to give, and the current that comes nearest.
@@ -93,7 +94,7 @@ fn rising_arc(
 const STEP_RAD: f64 = std::f64::consts::PI / ANGLE_STEPS as f64;
 
 fn at_angle(psi_wb: f64, angle: f64, from: (f64, f64), map: &SmoothMap, optimum: &Optimum) -> Option<Point> {
-    let (id, iq) = map.inverse(psi_wb * angle.cos(), psi_wb * angle.sin(), from)?;
+    let (id, iq) = map.inverse(psi_wb * cos(angle), psi_wb * sin(angle), from)?;
     Some(Point { id, iq, angle, torque: optimum.torque_nm(id, iq) })
 }
 
@@ -125,7 +126,7 @@ fn on_arc(arc: &[Point], wanted_nm: f64, psi_wb: f64, map: &SmoothMap, optimum: 
     let mut best = (b.id, b.iq);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
-        let Some(found) = map.inverse(psi_wb * middle.cos(), psi_wb * middle.sin(), best) else { break };
+        let Some(found) = map.inverse(psi_wb * cos(middle), psi_wb * sin(middle), best) else { break };
         best = found;
         if optimum.torque_nm(found.0, found.1) < wanted_nm { low = middle } else { high = middle }
     }

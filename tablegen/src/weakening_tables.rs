@@ -6,6 +6,7 @@
 use crate::axis::{Axis, curve, grid};
 use crate::weakening::{Circle, circle};
 use crate::{MachineFolder, SmoothMap};
+use libm::hypot;
 use std::f64::consts::{FRAC_2_PI, TAU};
 use tractive_control::machine::Weakening;
 
@@ -127,7 +128,7 @@ impl<'a> Circles<'a> {
         let high = (1.15 * top_flux_wb).max(1.5 * low);
         // The largest torque then may take almost as much flux linkage as there is.
         let most = smooth.at(0.0, parameters.max_current_a);
-        let high = if limited { high.min(ALMOST * most.psi_d_wb.hypot(most.psi_q_wb)) } else { high };
+        let high = if limited { high.min(ALMOST * hypot(most.psi_d_wb, most.psi_q_wb)) } else { high };
         let knee_wb = FLUX_KNEE * high;
         let share = |k: usize| {
             let x = k as f64 / (COLUMNS - 1) as f64 / (1.0 + SHARE_KNEE);
@@ -184,7 +185,7 @@ impl<'a> Circles<'a> {
         let highest_id = self.machine.map.id_a[self.machine.map.id_a.len() - 1];
         let allowed = |id: f64| id <= highest_id && id >= self.machine.parameters.least_id_a();
         let at = self.smooth.at(id, iq);
-        if from_wb == to_wb || (at.psi_d_wb.hypot(at.psi_q_wb) / from_wb - 1.0).abs() > 1e-9 {
+        if from_wb == to_wb || (hypot(at.psi_d_wb, at.psi_q_wb) / from_wb - 1.0).abs() > 1e-9 {
             return start;
         }
         for _ in 0..20 {
@@ -267,8 +268,8 @@ impl<'a> Circles<'a> {
                 continue;
             }
             let at = self.smooth.at(id, iq);
-            let flux = at.psi_d_wb.hypot(at.psi_q_wb) / self.flux_wb(at_row) - 1.0;
-            let current = id.hypot(iq) / self.machine.parameters.max_current_a - 1.0;
+            let flux = hypot(at.psi_d_wb, at.psi_q_wb) / self.flux_wb(at_row) - 1.0;
+            let current = hypot(id, iq) / self.machine.parameters.max_current_a - 1.0;
             most = (most.0.max(flux), most.1.max(current));
         }
         most

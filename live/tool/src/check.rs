@@ -15,19 +15,21 @@ use std::time::Duration;
 /// Widths of a window, in CSS pixels.
 const WIDTHS: [u32; 3] = [1280, 900, 390];
 
-/// Scenarios of either system whose traces in the page are the host's. In the others the plant's sine, the browser's own, shows in a last digit.
+/// All scenarios of either system in the page: their traces are the host's.
 const SAME: [&[&str]; 2] = [
     &[
         "sweep",
-        "sweep --to 2000",
+        "sweep --to 2000 --real",
         "load-steps",
         "full-step",
         "reversal",
+        "restart",
         "link-steps",
         "chopper",
+        "precharge",
         "acknowledge",
     ],
-    &["zs9-load-step"],
+    &["zs9-load-step", "zs9-reverse", "zs9-cycle"],
 ];
 
 /// Checks it with both systems; the rig makes the host's traces of the same scenarios.
@@ -265,7 +267,7 @@ fn equal_the_host(browser: &mut Browser, rig: &Path, lines: &[&str]) -> Result<(
     browser.until("the button runs one", "!!document.getElementById('sum').dataset.sha256")
 }
 
-/// `true` where the verdicts are the same: what is found may differ in a last digit, by the browser's own sine.
+/// `true` where the verdicts are the same: what is found may differ in a last digit, by the sine that figures are made with.
 fn alike(one: &Value, other: &Value) -> bool {
     let (Some(one), Some(other)) = (one.as_array(), other.as_array()) else { return false };
     let number = |of: &Value| of.as_f64().unwrap_or(f64::NAN);

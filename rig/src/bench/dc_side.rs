@@ -127,7 +127,7 @@ pub(super) fn line_v((healthy_v, fault): LineState) -> Option<f64> {
         Some((SupplyFault::Lost, _)) => None,
         Some((SupplyFault::To(line_v), _)) => Some(line_v),
         Some((SupplyFault::Swinging(amplitude_v, hz), since_s)) => {
-            Some(healthy_v + amplitude_v * (core::f64::consts::TAU * hz * since_s).sin())
+            Some(healthy_v + amplitude_v * libm::sin(core::f64::consts::TAU * hz * since_s))
         }
     }
 }

@@ -4,6 +4,7 @@
 //! Time is counted in whole ticks of the firmware's clock, so both sides agree on every instant. The bench never runs
 //! ahead of what is decided: it advances only as far as it is asked to, and everything it is told takes effect at a
 //! fixed delay after its nominal instant, so that arrival order changes nothing.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod conversions;
 mod dc_side;

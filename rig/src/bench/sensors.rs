@@ -99,7 +99,7 @@ impl Converter {
     pub fn pass(&mut self, currents_a: [f64; 3], dt_s: f64) {
         if self.flaws.current_filter_s > 0.0 && dt_s > 0.0 {
             let steps = dt_s / self.flaws.current_filter_s;
-            let kept = (-steps).exp();
+            let kept = libm::exp(-steps);
             let phases = self.filtered_a.iter_mut().zip(self.before_a).zip(currents_a);
             for ((filtered_a, before_a), current_a) in phases {
                 // Behind a ramp by what it rises in a time constant.
@@ -113,7 +113,7 @@ impl Converter {
     /// Ripple of the supply at an instant, in V.
     pub fn ripple_v(&self, t_s: f64) -> f64 {
         let ripple = self.flaws.udc_ripple;
-        ripple.map_or(0.0, |(amplitude_v, hz)| amplitude_v * (core::f64::consts::TAU * hz * t_s).sin())
+        ripple.map_or(0.0, |(amplitude_v, hz)| amplitude_v * libm::sin(core::f64::consts::TAU * hz * t_s))
     }
 
     /// Turn of an angle that is read late, in turns, at a speed in turns per s.
@@ -143,7 +143,9 @@ impl Converter {
 
     /// A step of a current converter, in A; 0 without steps.
     fn step_a(&self) -> f64 {
-        self.flaws.adc_bits.map_or(0.0, |bits| 2.0 * self.flaws.adc_full_scale_a / f64::from(bits).exp2())
+        self.flaws
+            .adc_bits
+            .map_or(0.0, |bits| 2.0 * self.flaws.adc_full_scale_a / libm::exp2(f64::from(bits)))
     }
 
     /// A motor's phase currents as converted now, in A.
@@ -173,7 +175,7 @@ impl Converter {
             .zip(flaws.angle_phases_deg)
             .zip([1.0, 2.0])
             .map(|((deg, phase_deg), order)| {
-                deg * (core::f64::consts::TAU * order * true_turns + phase_deg.to_radians()).sin()
+                deg * libm::sin(core::f64::consts::TAU * order * true_turns + phase_deg.to_radians())
             })
             .sum();
         let error_turns = (flaws.angle_error_deg + harmonics_deg) / 360.0;

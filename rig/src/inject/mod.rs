@@ -1,4 +1,5 @@
 //! Faults that are injected, and their times: what is the same of both systems here, the kinds of each beside it.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod sensor;
 pub mod traction;

@@ -156,7 +156,7 @@ impl Spoiler {
             Some(Kind::SourceHigh) => 900.0,
             Some(Kind::SourceSwings(amplitude_v, hz)) => {
                 let since_s = self.injected.since_s(t_s);
-                source_v + amplitude_v * (core::f64::consts::TAU * hz * since_s).sin()
+                source_v + amplitude_v * libm::sin(core::f64::consts::TAU * hz * since_s)
             }
             _ => source_v,
         }

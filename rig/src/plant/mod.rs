@@ -3,6 +3,7 @@
 //! Stator equation in the rotor frame, with the smooth flux map's incremental inductances:
 //! `L(i) di/dt = u − R i − jω ψ(i)`. Amplitude-invariant, peak, electrical; d along the magnet flux; currents positive into the
 //! machine. The legs' voltages count from the link's midpoint.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod dc_link;
 mod devices;
@@ -195,8 +196,8 @@ impl Plant {
         let rotor = &self.motor.rotor;
         let turning = rotor.turning(|| self.motor.torque_nm(), dt_s);
         let begin = rotor.sin_cos();
-        let middle = rotated(begin, turning.turned(0.5 * dt_s).sin_cos());
-        let end = rotated(begin, turning.turned(dt_s).sin_cos());
+        let middle = rotated(begin, libm::sincos(turning.turned(0.5 * dt_s)));
+        let end = rotated(begin, libm::sincos(turning.turned(dt_s)));
         let half = turning.omega(0.5 * dt_s);
         let k1 = slope(y0, begin, turning.omega(0.0));
         let k2 = slope(&along(y0, &k1, 0.5 * dt_s), middle, half);

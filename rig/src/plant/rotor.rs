@@ -45,7 +45,7 @@ impl Rotor {
     pub fn turn_to(&mut self, angle_turns: f64) {
         self.angle_turns =
             if (0.0..1.0).contains(&angle_turns) { angle_turns } else { angle_turns.rem_euclid(1.0) };
-        self.sin_cos = (self.angle_turns * TAU).sin_cos();
+        self.sin_cos = libm::sincos(self.angle_turns * TAU);
     }
 
     /// Electrical rotor angle, in turns, 0 ≤ x < 1.

@@ -2,6 +2,7 @@
 
 use super::PlantSettings;
 use super::runge_kutta::rotated;
+use libm::{atan2, hypot, sincos};
 use tractive_tablegen::{FluxMap, FluxPoint, Iron, MachineFolder, SmoothMap};
 
 /// Stator of a machine: `L(i) di/dt = u − R i − jω ψ(i)`, with the incremental inductances of the flux map.
@@ -221,7 +222,7 @@ impl Stator {
     /// to nothing while `against_v` takes the flux linkage away.
     pub fn braked_j(&self, (id_a, iq_a): (f64, f64), speed_rad_s: f64, against_v: f64) -> f64 {
         let flux = self.flux(id_a, iq_a);
-        let decay_s = flux.psi_d_wb.hypot(flux.psi_q_wb) / against_v;
+        let decay_s = hypot(flux.psi_d_wb, flux.psi_q_wb) / against_v;
         0.5 * (self.torque_nm(id_a, iq_a) * speed_rad_s).abs() * decay_s
     }
 
@@ -231,18 +232,19 @@ impl Stator {
         const ANGLES: u32 = 180;
         const STEPS: u32 = 20;
         let start = self.flux(id_a, iq_a);
-        let (radius, from) = (start.psi_d_wb.hypot(start.psi_q_wb), start.psi_q_wb.atan2(start.psi_d_wb));
-        let (mut id, mut iq, mut most) = (id_a, iq_a, id_a.hypot(iq_a));
+        let (radius, from) = (hypot(start.psi_d_wb, start.psi_q_wb), atan2(start.psi_q_wb, start.psi_d_wb));
+        let (mut id, mut iq, mut most) = (id_a, iq_a, hypot(id_a, iq_a));
         for k in 0..=ANGLES {
             let angle = from - core::f64::consts::TAU * f64::from(k) / f64::from(ANGLES);
             for _ in 0..STEPS {
                 let at = self.flux(id, iq);
-                let (off_d, off_q) = (radius * angle.cos() - at.psi_d_wb, radius * angle.sin() - at.psi_q_wb);
+                let (sin, cos) = sincos(angle);
+                let (off_d, off_q) = (radius * cos - at.psi_d_wb, radius * sin - at.psi_q_wb);
                 let det = at.ldd_h * at.lqq_h - at.ldq_h * at.lqd_h;
                 id += (at.lqq_h * off_d - at.ldq_h * off_q) / det;
                 iq += (at.ldd_h * off_q - at.lqd_h * off_d) / det;
             }
-            most = most.max(id.hypot(iq));
+            most = most.max(hypot(id, iq));
         }
         most
     }

@@ -158,7 +158,7 @@ fn ratio(sensor: &Sensor, wire: Wire, celsius: f64) -> u16 {
 fn resistance_ohm(element: Element, celsius: f64) -> f64 {
     match element {
         Element::Ntc { at_25_ohm, beta_k } => {
-            f64::from(at_25_ohm) * (f64::from(beta_k) * (1.0 / (celsius + 273.15) - 1.0 / 298.15)).exp()
+            f64::from(at_25_ohm) * libm::exp(f64::from(beta_k) * (1.0 / (celsius + 273.15) - 1.0 / 298.15))
         }
         Element::Pt1000 => {
             let cubic = if celsius < 0.0 { -4.183e-12 * (celsius - 100.0) * celsius.powi(3) } else { 0.0 };

@@ -329,7 +329,7 @@ fn turned(from: (f64, f64), by: f64) -> (f64, f64) {
 fn small_sin_cos(x: f64) -> (f64, f64) {
     const SMALL: f64 = 0.05;
     if x.abs() > SMALL {
-        return x.sin_cos();
+        return libm::sincos(x);
     }
     let z = x * x;
     let sin = x * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0)));

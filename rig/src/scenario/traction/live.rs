@@ -1,4 +1,5 @@
 //! A drive that somebody drives by hand, as long as he likes: plant, contactors, operator and drive as in every scenario, stepped from outside.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub use crate::scenario::live::{Command, Start, Turning, Wanted};
 
@@ -243,7 +244,7 @@ impl Live {
             Some((SupplyFault::Lost, _)) => source.resistance_ohm = CUT_OFF_OHM,
             Some((SupplyFault::To(line_v), _)) => source.voltage_v = line_v,
             Some((SupplyFault::Swinging(amplitude_v, hz), since_s)) => {
-                source.voltage_v += amplitude_v * (TAU * hz * (now_s - since_s)).sin();
+                source.voltage_v += amplitude_v * libm::sin(TAU * hz * (now_s - since_s));
             }
         }
         if let Some(link) = self.bench.link_mut() {

@@ -3,6 +3,7 @@
 //! Time is counted in compare steps of the firmware's timers, so both sides agree on every edge. As on the first
 //! system's bench nothing runs ahead of what is decided, and what an interrupt orders takes effect at a fixed delay after
 //! its nominal instant.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod carrier;
 mod gates;

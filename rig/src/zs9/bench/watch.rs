@@ -35,7 +35,7 @@ impl Bench {
         let (parts, network) = (self.plant.parts, self.plant.network);
         let (source_v, link_v) = (self.plant.source_v, self.plant.link_v().max(self.plant.source_v));
         let surge_v = network.inductor_a() * (parts.inductance_h / parts.capacitance_f).sqrt();
-        let unloaded_v = source_v + (network.capacitor_v() - source_v).hypot(surge_v);
+        let unloaded_v = source_v + libm::hypot(network.capacitor_v() - source_v, surge_v);
         // In series with the other motor each has a third of the link against it.
         let motors = &self.plant.motors;
         let stored = Stored::of(motors, link_v / 3.0, unloaded_v);
