@@ -82,7 +82,7 @@ pub fn programs(
         eprintln!("mutants: building, without {}", left_out.len());
         let messages = cargo_all(to, target, packages)?;
         if messages.success {
-            return Ok(messages.lines.iter().filter_map(program).collect());
+            return Ok(messages.programs());
         }
         let before = left_out.len();
         for line in &messages.lines {
@@ -96,12 +96,24 @@ pub fn programs(
     bail!("the build failed {BUILDS} times")
 }
 
-struct Messages {
-    success: bool,
+/// What cargo said.
+pub struct Messages {
+    pub success: bool,
     lines: Vec<Value>,
 }
 
 impl Messages {
+    /// The programs that were built.
+    pub fn programs(&self) -> Vec<Program> {
+        self.lines.iter().filter_map(program).collect()
+    }
+
+    /// The first error's code.
+    pub fn code(&self) -> String {
+        let error = self.lines.iter().find(|line| line["message"]["level"] == "error");
+        error.and_then(|line| line["message"]["code"]["code"].as_str()).unwrap_or("error").to_owned()
+    }
+
     fn rendered(&self) -> String {
         let errors = self.lines.iter().filter(|line| line["message"]["level"] == "error");
         errors.filter_map(|line| line["message"]["rendered"].as_str()).take(5).collect()
@@ -109,7 +121,7 @@ impl Messages {
 }
 
 /// The rig in a command of its own: its features are not the others'.
-fn cargo_all(to: &Path, target: &Path, packages: &[String]) -> Result<Messages> {
+pub fn cargo_all(to: &Path, target: &Path, packages: &[String]) -> Result<Messages> {
     let (rig, others): (Vec<_>, Vec<_>) =
         packages.iter().map(String::as_str).partition(|package| *package == RIG);
     let mut all = Messages { success: true, lines: Vec::new() };

@@ -3,6 +3,7 @@
 mod areas;
 mod build;
 mod changed;
+mod constants;
 mod modules;
 mod report;
 mod results;
@@ -30,6 +31,9 @@ pub struct Options {
     /// Only those of files whose path begins so (may be repeated)
     #[arg(long)]
     file: Vec<String>,
+    /// Only those in constants and lengths, which take a build each
+    #[arg(long, conflicts_with = "sample")]
+    constants: bool,
     /// Shard K of N, from 0, into a file of its own
     #[arg(long, value_name = "K/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
@@ -57,7 +61,7 @@ pub struct Options {
     /// Threads
     #[arg(long, value_name = "N", default_value_t = 2)]
     jobs: usize,
-    /// Try those again that were missed
+    /// Try those again that were missed, and are not known
     #[arg(long)]
     again: bool,
     /// Exit code 1 only where less than this share of what was tried is noticed by tests, or known, in percent [default: where a
@@ -71,7 +75,7 @@ pub struct Options {
     #[arg(long)]
     report: bool,
     /// Make the results of the whole of all shards' files, and report
-    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["shard", "sample", "area", "file"])]
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["shard", "sample", "area", "file", "constants"])]
     merge: Vec<PathBuf>,
 }
 

@@ -10,8 +10,21 @@ use anyhow::Result;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Errors that say that the mutant is no program: types that do not fit, a trait that is not there, a missing arm.
-const UNVIABLE: [&str; 8] = ["E0277", "E0308", "E0369", "E0600", "E0599", "E0368", "E0282", "E0283"];
+/// Errors that say that the mutant is no program: types that do not fit, a trait that is not there or not while compiling, a missing arm,
+/// an overflow that the compiler sees.
+const UNVIABLE: [&str; 11] = [
+    "E0277",
+    "E0308",
+    "E0369",
+    "E0600",
+    "E0599",
+    "E0368",
+    "E0282",
+    "E0283",
+    "E0790",
+    "E0015",
+    "arithmetic_overflow",
+];
 
 /// The counts of the areas, and their survivors that are not known.
 fn counted(
@@ -28,18 +41,23 @@ fn counted(
         let Some(area) = mutant.area() else { continue };
         let count = counts.entry(area).or_default();
         let list = survivors.entry(area).or_default();
-        let fixed = mutant.fixed.then_some("constant");
-        if let Some(code) = left_out.get(&mutant.number).map(String::as_str).or(fixed) {
+        if let Some(code) = left_out.get(&mutant.number).map(String::as_str) {
             let of = if UNVIABLE.contains(&code) { &mut count.unviable } else { &mut count.elsewhere };
             *of += 1;
             continue;
         }
         let Some(line) = results.of(mutant) else {
-            count.open += 1;
+            // A sample tries none of those that need a build each.
+            let of = if (mutant.fixed || mutant.early) && options.sample.is_some() {
+                &mut count.elsewhere
+            } else {
+                &mut count.open
+            };
+            *of += 1;
             continue;
         };
-        if line.outcome == Outcome::Unreached && mutant.early {
-            count.elsewhere += 1;
+        if line.outcome == Outcome::NoProgram {
+            count.unviable += 1;
             continue;
         }
         *count.of.entry(line.outcome).or_default() += 1;

@@ -23,6 +23,15 @@ pub enum Outcome {
     Missed,
     /// No test comes by it.
     Unreached,
+    /// In a constant: it does not compile.
+    NoProgram,
+}
+
+impl Outcome {
+    /// Nothing that more time could change.
+    pub fn is_settled(self) -> bool {
+        matches!(self, Self::Killed | Self::Late | Self::NoProgram)
+    }
 }
 
 /// A line of the file.

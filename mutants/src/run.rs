@@ -2,14 +2,15 @@
 
 use crate::build::{self, Program};
 use crate::changed;
-use crate::results::{Line, Outcome, Results};
+use crate::constants;
+use crate::results::{KnownList, Line, Outcome, Results};
 use crate::shards::{self, Head};
 use crate::tree::{self, Mutant, Tree};
 use crate::trials::{self, End, Trial};
 use crate::{Options, Places};
 use anyhow::{Context, Result};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 use std::sync::Mutex;
@@ -23,7 +24,9 @@ pub fn chosen<'a>(mutants: &'a [Mutant], options: &Options) -> Vec<&'a Mutant> {
     let file = |mutant: &Mutant| {
         options.file.is_empty() || options.file.iter().any(|file| mutant.file.starts_with(file.as_str()))
     };
-    let mut chosen: Vec<&Mutant> = mutants.iter().filter(|mutant| area(mutant) && file(mutant)).collect();
+    let kind = |mutant: &Mutant| !options.constants || mutant.fixed;
+    let mut chosen: Vec<&Mutant> =
+        mutants.iter().filter(|mutant| area(mutant) && file(mutant) && kind(mutant)).collect();
     if let Some((k, n)) = options.shard {
         chosen = chosen.into_iter().skip(k).step_by(n).collect();
     }
@@ -85,26 +88,40 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;
     let trials = learnt(places, &programs, options)?;
     let results = Results::open(&shards::file(places, options), Head::new(places, tree, options).as_ref())?;
-    let mut open: Vec<&Mutant> = chosen(&tree.mutants, options)
+    let known = KnownList::read(&places.root.join("mutants/known.toml"), &tree.mutants)?;
+    let (fixed, mut open): (Vec<&Mutant>, Vec<&Mutant>) = chosen(&tree.mutants, options)
         .into_iter()
-        .filter(|mutant| !mutant.fixed && !left_out.contains_key(&mutant.number))
+        .filter(|mutant| !left_out.contains_key(&mutant.number))
         .filter(|mutant| match results.of(mutant).map(|line| line.outcome) {
             None => true,
-            Some(outcome) => options.again && !matches!(outcome, Outcome::Killed | Outcome::Late),
+            Some(outcome) => options.again && !outcome.is_settled() && !known.has(mutant),
         })
-        .collect();
+        .partition(|mutant| mutant.fixed);
     // In no order: a run that is stopped is then a sample of all.
     open.sort_by_cached_key(|mutant| drawn(0, mutant));
     let search = Search::new(&trials, options.budget, &places.work);
-    let done = AtomicUsize::new(0);
+    let (done, alone) = (AtomicUsize::new(0), Mutex::new(fixed));
     open.par_iter().with_max_len(1).try_for_each(|mutant| {
         let (outcome, by) = search.of(mutant)?;
         let count = done.fetch_add(1, Ordering::Relaxed) + 1;
         if count.is_multiple_of(100) {
             eprintln!("mutants: {count} of {} tried", open.len());
         }
+        if outcome == Outcome::Unreached && mutant.early {
+            if let Ok(mut alone) = alone.lock() {
+                alone.push(mutant);
+            }
+            return Ok(());
+        }
         results.add(&Line { name: mutant.name(), source: mutant.hash, outcome, by })
-    })
+    })?;
+    let mut alone = alone.into_inner().unwrap_or_default();
+    alone.sort_by_key(|mutant| mutant.number);
+    // A build each: none of a sample.
+    if options.sample.is_none() && !alone.is_empty() {
+        constants::run(places, tree, &search, &packages, &alone, &results)?;
+    }
+    Ok(())
 }
 
 /// Limits up to which it is looked for what was learnt, in s.
@@ -151,7 +168,7 @@ fn learnt(places: &Places, programs: &[Program], options: &Options) -> Result<Ve
 }
 
 /// The trials, and what is known of them.
-struct Search<'a> {
+pub struct Search<'a> {
     trials: &'a [Trial],
     /// For each mutant the trials that come by it.
     by: HashMap<u32, Vec<usize>>,
@@ -162,7 +179,7 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(trials: &'a [Trial], budget: f64, work: &'a Path) -> Self {
+    pub fn new(trials: &'a [Trial], budget: f64, work: &'a Path) -> Self {
         let mut by: HashMap<u32, Vec<usize>> = HashMap::new();
         for (index, trial) in trials.iter().enumerate() {
             for number in &trial.reached {
@@ -172,9 +189,21 @@ impl<'a> Search<'a> {
         Self { trials, by, scores: Mutex::default(), budget, work }
     }
 
-    /// The trials in the order in which a kill is expected to cost least; tests before the rig's bytes.
-    fn order(&self, mutant: &Mutant) -> Vec<usize> {
-        let mut order = self.by.get(&mutant.number).cloned().unwrap_or_default();
+    /// The trials that come by any of a file's mutants; all of them, where none does.
+    pub fn of_file(&self, mutants: &[Mutant], file: &str) -> Vec<usize> {
+        let own = mutants.iter().filter(|mutant| mutant.file == file);
+        let found: BTreeSet<usize> =
+            own.filter_map(|mutant| self.by.get(&mutant.number)).flatten().copied().collect();
+        if found.is_empty() { (0..self.trials.len()).collect() } else { found.into_iter().collect() }
+    }
+
+    /// A trial by its place.
+    pub fn trial(&self, index: usize) -> Option<&Trial> {
+        self.trials.get(index)
+    }
+
+    /// Trials in the order in which a kill of a mutant is expected to cost least; tests before the rig's bytes.
+    fn ordered(&self, mutant: &Mutant, mut order: Vec<usize>) -> Vec<usize> {
         let scores = self.scores.lock();
         let cost = |index: &usize| {
             let Some(trial) = self.trials.get(*index) else { return (true, f64::MAX) };
@@ -189,7 +218,18 @@ impl<'a> Search<'a> {
     }
 
     fn of(&self, mutant: &Mutant) -> Result<(Outcome, String)> {
-        let order = self.order(mutant);
+        let by = self.by.get(&mutant.number).cloned().unwrap_or_default();
+        self.tried(mutant, by, |trial| trial.run(mutant.number, &self.work.join("scratch")))
+    }
+
+    /// Runs trials, until one notices or the budget is spent.
+    pub fn tried(
+        &self,
+        mutant: &Mutant,
+        by: Vec<usize>,
+        run: impl Fn(&Trial) -> Result<End>,
+    ) -> Result<(Outcome, String)> {
+        let order = self.ordered(mutant, by);
         if order.is_empty() {
             return Ok((Outcome::Unreached, String::new()));
         }
@@ -203,7 +243,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             *left -= trial.seconds;
-            let end = trial.run(mutant.number, &self.work.join("scratch"))?;
+            let end = run(trial)?;
             if let Ok(mut scores) = self.scores.lock() {
                 let (runs, kills) = scores.entry((mutant.file.clone(), *index)).or_default();
                 *runs += 1.0;

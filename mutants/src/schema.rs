@@ -35,7 +35,7 @@ struct Edit {
 pub fn of(source: &str, sites: &[Site], numbers: &[Vec<u32>]) -> Schema {
     let mut edits = Vec::new();
     for (index, (site, numbers)) in sites.iter().zip(numbers).enumerate() {
-        if numbers.iter().any(|number| *number > 0) {
+        if !site.fixed && numbers.iter().any(|number| *number > 0) {
             edit(source, site, index, numbers, &mut edits);
         }
     }
@@ -68,6 +68,26 @@ pub fn of(source: &str, sites: &[Site], numbers: &[Vec<u32>]) -> Schema {
         schema.written.extend(place.map(|bytes| Written { bytes, numbers }));
     }
     schema
+}
+
+/// What one mutant of a site puts in the place of which bytes, where it is compiled alone.
+pub fn alone(source: &str, site: &Site, index: usize) -> Option<(Bytes, String)> {
+    let signed = |right: usize, other: &str| (site.left..right, format!(" {other} "));
+    Some(match &site.shape {
+        Shape::Operator { right, others, .. } | Shape::Assignment { right, others, .. } => {
+            signed(*right, others.get(index)?)
+        }
+        Shape::Lazy { right, and } => signed(*right, if *and { "||" } else { "&&" }),
+        Shape::Sign { operand } => (site.bytes.start..*operand, String::new()),
+        Shape::Arm => (site.bytes.clone(), " if false".to_owned()),
+        Shape::Guard => (site.bytes.clone(), (index == 0).to_string()),
+        Shape::Fields { base, fields } => {
+            let (name, short, value) = fields.get(index)?;
+            let name_of = if *short { format!("{name}: ") } else { String::new() };
+            (value.clone(), format!("{name_of}({}).{name}", source.get(base.clone())?))
+        }
+        Shape::Body(values) => (site.bytes.clone(), format!(" return {};", values.get(index)?)),
+    })
 }
 
 /// Ways to put text in for one site.
@@ -122,7 +142,6 @@ fn edit(source: &str, site: &Site, index: usize, numbers: &[u32], edits: &mut Ve
     let text = |bytes: Bytes| source.get(bytes).unwrap_or_default();
     let mut editor = Editor { site: index, bytes: bytes.clone(), edits };
     match &site.shape {
-        Shape::Fixed => {}
         Shape::Body(values) => {
             let there = numbers.iter().zip(values).filter(|(number, _)| **number > 0);
             let pieces = there
@@ -249,7 +268,7 @@ mod tests {
             for found in &site.mutants {
                 number += 1;
                 let is_written = text.contains(&format!("is({number})"));
-                assert_eq!(is_written, !matches!(site.shape, Shape::Fixed), "{}: {text}", found.what);
+                assert_eq!(is_written, !site.fixed, "{}: {text}", found.what);
             }
         }
         assert!(number > 10);

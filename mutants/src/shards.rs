@@ -20,6 +20,7 @@ pub struct Plan {
     budget: f64,
     longest: u64,
     bytes: bool,
+    constants: bool,
     /// A hash of the sources of all mutants.
     sources: u64,
     /// The mutants that do not compile this way: names, each with the error's code.
@@ -39,10 +40,11 @@ impl Head {
     pub fn new(places: &Places, tree: &Tree, options: &Options) -> Option<Self> {
         let (shard, shards) = options.shard?;
         let left_out = run::named(tree, &left_out(places, tree));
-        let Options { area, file, tests, budget, longest, bytes, .. } = options;
+        let Options { area, file, tests, budget, longest, bytes, constants, .. } = options;
         let (area, file, tests) = (area.clone(), file.clone(), tests.clone());
-        let (budget, longest, bytes) = (*budget, *longest, *bytes);
-        let plan = Plan { area, file, tests, budget, longest, bytes, sources: tree.hash(), left_out };
+        let (budget, longest, bytes, constants) = (*budget, *longest, *bytes, *constants);
+        let plan =
+            Plan { area, file, tests, budget, longest, bytes, constants, sources: tree.hash(), left_out };
         Some(Self { shard, shards, plan })
     }
 }
@@ -94,9 +96,10 @@ pub fn merge(paths: &[PathBuf], places: &Places, tree: &Tree, options: &mut Opti
     }
     ensure!(shards.len() == count, "shard {} of {count} is missing", shards.len());
     ensure!(plan.sources == tree.hash(), "the shards are of other sources than this commit's");
-    let Plan { area, file, tests, budget, longest, bytes, left_out, .. } = plan;
+    let Plan { area, file, tests, budget, longest, bytes, constants, left_out, .. } = plan;
     (options.area, options.file, options.tests) = (area, file, tests);
-    (options.budget, options.longest, options.bytes, options.shard) = (budget, longest, bytes, None);
+    (options.budget, options.longest, options.bytes) = (budget, longest, bytes);
+    (options.constants, options.shard) = (constants, None);
     let mut tried: HashMap<String, Line> = HashMap::new();
     for line in shards.into_iter().flat_map(|shard| shard.lines) {
         if let Some(line) = tried.insert(line.name.clone(), line) {
@@ -104,7 +107,7 @@ pub fn merge(paths: &[PathBuf], places: &Places, tree: &Tree, options: &mut Opti
         }
     }
     let wanted = chosen(&tree.mutants, options).into_iter();
-    let wanted = wanted.filter(|mutant| !mutant.fixed && !left_out.contains_key(&mutant.name()));
+    let wanted = wanted.filter(|mutant| !left_out.contains_key(&mutant.name()));
     let lines = wanted.map(|mutant| {
         let name = mutant.name();
         tried.remove(&name).with_context(|| format!("{name}: was not tried"))
@@ -149,8 +152,7 @@ mod tests {
             let head = Head::new(&self.places, &self.tree, &options);
             let path = file(&self.places, &options);
             let results = Results::open(&path, head.as_ref()).unwrap();
-            let mutants: Vec<&Mutant> =
-                chosen(&self.tree.mutants, &options).into_iter().filter(|mutant| !mutant.fixed).collect();
+            let mutants: Vec<&Mutant> = chosen(&self.tree.mutants, &options);
             for mutant in mutants.iter().take(mutants.len() - left) {
                 let (outcome, by) = (Outcome::Killed, String::new());
                 results.add(&Line { name: mutant.name(), source: mutant.hash, outcome, by }).unwrap();
@@ -203,8 +205,7 @@ mod tests {
         let options = run.options("--shard 0/1");
         let head = Head::new(&run.places, &run.tree, &options);
         let results = Results::open(&path, head.as_ref()).unwrap();
-        let open: Vec<_> =
-            run.tree.mutants.iter().filter(|mutant| results.of(mutant).is_none() && !mutant.fixed).collect();
+        let open: Vec<_> = run.tree.mutants.iter().filter(|mutant| results.of(mutant).is_none()).collect();
         assert_eq!(open.len(), 2);
         for mutant in open {
             let (outcome, by) = (Outcome::Killed, String::new());

@@ -43,16 +43,16 @@ pub enum Shape {
     Guard,
     /// The fields of a structure with a base: each field's name, whether it is written short, its value.
     Fields { base: Bytes, fields: Vec<(String, bool, Bytes)> },
-    /// Compiled before it can be chosen: in a constant, a type, a length.
-    Fixed,
 }
 
-/// A place: its bytes, its left operand's end where it has one, its shape, and its mutants.
+/// A place: its bytes, its left operand's end where it has one, its shape, and its mutants; `fixed` where it is compiled before one could be
+/// chosen: in a constant, a type, a length.
 #[derive(Clone, Debug)]
 pub struct Site {
     pub bytes: Bytes,
     pub left: usize,
     pub shape: Shape,
+    pub fixed: bool,
     pub mutants: Vec<Found>,
 }
 
@@ -82,9 +82,9 @@ impl Finder {
         let (line, column, early) = (start.line, start.column + 1, self.early);
         let found = |what| Found { line, column, function: function.clone(), what, early };
         let mutants: Vec<_> = whats.into_iter().map(found).collect();
-        let shape = if self.fixed > 0 { Shape::Fixed } else { shape };
+        let fixed = self.fixed > 0;
         if !mutants.is_empty() {
-            self.sites.push(Site { bytes, left, shape, mutants });
+            self.sites.push(Site { bytes, left, shape, fixed, mutants });
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::areas::{Area, CRATES};
 use crate::modules;
 use crate::schema::{self, Schema};
-use crate::sites::{self, Found, Shape, Site};
+use crate::sites::{self, Bytes, Found, Site};
 use anyhow::{Context, Result, bail};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -22,8 +22,10 @@ pub struct Mutant {
     pub source: String,
     /// Compiled before it can be chosen.
     pub fixed: bool,
-    /// In a `const fn`.
+    /// In a `const fn`: where it runs only while compiling, no test comes by it.
     pub early: bool,
+    /// In a build of its own, what it puts in the place of which bytes of its file; of those two alone.
+    pub alone: Option<(Bytes, String)>,
     /// The hash of the file.
     pub hash: u64,
 }
@@ -44,7 +46,7 @@ impl Mutant {
 /// A file with its sites and their numbers.
 pub struct Source {
     pub file: String,
-    text: String,
+    pub text: String,
     sites: Vec<Site>,
     numbers: Vec<Vec<u32>>,
 }
@@ -92,9 +94,9 @@ impl Tree {
         let hash = hasher.finish();
         let mut numbers = Vec::new();
         for site in &sites {
-            let fixed = matches!(site.shape, Shape::Fixed);
-            let own = site.mutants.iter().map(|found| {
+            let own = site.mutants.iter().enumerate().map(|(index, found)| {
                 let Found { line, column, function, what, early } = found.clone();
+                let alone = if site.fixed || early { schema::alone(&text, site, index) } else { None };
                 let source = lines.get(line.saturating_sub(1)).map_or("", |line| line.trim()).to_owned();
                 let number = self.mutants.len() as u32 + 1;
                 self.mutants.push(Mutant {
@@ -105,8 +107,9 @@ impl Tree {
                     function,
                     what,
                     source,
-                    fixed,
+                    fixed: site.fixed,
                     early,
+                    alone,
                     hash,
                 });
                 number

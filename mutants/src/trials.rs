@@ -92,6 +92,11 @@ impl Trial {
         (same && !self.reached.is_empty()).then_some(self)
     }
 
+    /// Runs it of another build, with a mutant that is compiled in.
+    pub fn run_in(&self, program: &Program, scratch: &Path) -> Result<End> {
+        Self { program: program.clone(), ..self.clone() }.run(0, scratch)
+    }
+
     /// Runs it with a mutant.
     pub fn run(&self, mutant: u32, scratch: &Path) -> Result<End> {
         let folder = tempfolder(scratch)?;

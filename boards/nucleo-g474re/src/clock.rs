@@ -9,7 +9,7 @@ use stm32_metapac::{flash, rcc};
 const SUPPLY_THRESHOLD: u8 = 6;
 
 /// PWR_CR5.R1MODE (RM0440): bit 8, set after a reset. The register crate has it in bit 0, where nothing is.
-pub const NORMAL_MODE: u32 = 1 << 8;
+const NORMAL_MODE: u32 = 1 << 8;
 
 /// Takes USB's dead-battery pull-downs of 5.1 kΩ off PB4 and PB6. They are there from reset on, switched by PA9 and PA10, all of
 /// which have other uses here (RM0440, PWR_CR3.UCPD1_DBDIS). The power controller is clocked from here on.

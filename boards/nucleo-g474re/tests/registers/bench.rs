@@ -1,12 +1,14 @@
 //! Register blocks in ordinary memory, and as much of the hardware behind them as the board relies on: preload, update events,
 //! the combined PWM modes, the dead-time generator, the main output, breaks. After the reference manual, not the board.
 
-use nucleo_g474re::clock::NORMAL_MODE;
 use nucleo_g474re::legs::Legs;
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::start::{Timeout, Wait};
 use std::cell::Cell;
 use stm32_metapac as pac;
+
+/// PWR_CR5 after a reset, R1MODE set: range 1 is without boost (RM0440).
+pub const PWR_CR5_AFTER_RESET: u32 = 0x100;
 
 /// A block of registers that is never freed, so that handles to it stay good.
 fn block() -> *mut () {
@@ -147,8 +149,7 @@ impl Bench {
             port.moder().write_value(pac::gpio::regs::Moder(mode));
             port.pupdr().write_value(pac::gpio::regs::Pupdr(pulls));
         }
-        // Range 1 is without boost after a reset (RM0440, PWR_CR5).
-        registers.pwr.cr5().write(|w| w.0 = NORMAL_MODE);
+        registers.pwr.cr5().write(|w| w.0 = PWR_CR5_AFTER_RESET);
         Self {
             registers,
             legs: [Leg::default(); 3],

@@ -1,8 +1,7 @@
 //! The start: its order, what it writes, what it refuses.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, PWR_CR5_AFTER_RESET};
 use crate::plan;
-use nucleo_g474re::clock::NORMAL_MODE;
 use nucleo_g474re::pins::PINS;
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::start::{Found, Plan, STEPS, Start, StartError, prepare, run};
@@ -249,7 +248,7 @@ fn a_peripheral_is_written_to_only_after_its_clock_has_come() {
     bench.watch = |registers| {
         let [power, system] = SEEN.get();
         let untouched =
-            !registers.pwr.cr3().read().ucpd1_dbdis() && registers.pwr.cr5().read().0 == NORMAL_MODE;
+            !registers.pwr.cr3().read().ucpd1_dbdis() && registers.pwr.cr5().read().0 == PWR_CR5_AFTER_RESET;
         SEEN.set([
             power || (registers.rcc.apb1enr1().read().pwren() && untouched),
             system || (registers.rcc.apb2enr().read().syscfgen() && registers.syscfg.cfgr2().read().0 == 0),
