@@ -187,3 +187,16 @@ fn weakened(torque_nm: f32, mtpa_squared: f32, at: &Electrical, tables: &Tables)
         inside,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Region;
+
+    #[test]
+    fn a_region_has_its_name_in_files() {
+        assert_eq!(
+            [Region::Mtpa, Region::Weakening, Region::Limit].map(Region::name),
+            ["mtpa", "fw", "limit"]
+        );
+    }
+}

@@ -343,11 +343,21 @@ impl Mode {
     }
 }
 
-#[cfg(all(test, feature = "optimal"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 
+    #[test]
+    fn a_mode_of_the_paper_turns_on_as_often_as_its_name_says() {
+        let paper = [("async", 0), ("sync15", 15), ("sync12", 12), ("mid7", 7), ("mid3", 3), ("square", 1)];
+        for (name, turn_ons) in paper {
+            let mode = Mode::named(name).unwrap();
+            assert_eq!((mode.name(), mode.turn_ons()), (name, turn_ons));
+        }
+    }
+
     /// At the index at which a branch gives way on the way up the next one is played.
+    #[cfg(feature = "optimal")]
     #[test]
     fn at_its_border_a_branch_has_given_way() {
         let family = || Mode::ALL.into_iter().filter(|mode| mode.family() == "opp7");
