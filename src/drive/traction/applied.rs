@@ -255,6 +255,12 @@ mod tests {
             assert_eq!(of(Mode::Async, switching_hz), does, "{switching_hz} Hz");
         }
         assert!(!of(Mode::Sync15, 10_000.0), "its ripple is known");
+        let limits = SwitchLimits::new(250, 0, 900.0, &clock);
+        let half = |shortest_half_ticks| Settings::new(clock, SwitchLimits { shortest_half_ticks, ..limits });
+        assert!(
+            aliases(Mode::Async, &half(13_749)) && !aliases(Mode::Async, &half(13_750)),
+            "eleven are enough"
+        );
     }
 
     /// A pattern's ripple of a machine that turns backward is that of one that turns forward, upside down.
