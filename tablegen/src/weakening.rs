@@ -198,6 +198,19 @@ mod tests {
     }
 
     #[test]
+    fn a_summit_is_found_from_either_side() {
+        const PSI_WB: f64 = 0.22;
+        let (machine, smooth) = linear();
+        let optimum = Optimum::new(&smooth, &machine.parameters);
+        let [below, above] = [0.8, 2.4].map(|angle| {
+            let start = at_angle(PSI_WB, angle, (0.0, 5.0), &smooth, &optimum).unwrap();
+            summit(PSI_WB, start, &smooth, &optimum, |_| true)
+        });
+        near(below.angle, above.angle, 1e-6);
+        near(below.torque, most_nm(PSI_WB, 1e9, -1e9), 1e-6);
+    }
+
+    #[test]
     fn circles_of_a_linear_machine() {
         let (machine, smooth) = linear();
         for (psi_wb, most_a) in

@@ -66,6 +66,24 @@ fn parameters_of_a_linear_machine_are_constants() {
 }
 
 /// A surface that is bilinear itself is read exactly, beyond the grid too.
+/// The static inductance along d is the chord from no current along d on, from the next node on, too; on the axis itself the incremental one.
+#[test]
+fn static_inductances_of_a_curved_machine_are_chords() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tables/pmasynrm-180kw");
+    let MachineFolder { map, .. } = MachineFolder::read(std::path::Path::new(folder)).unwrap();
+    let smooth = SmoothMap::new(&map);
+    let least = Regular { psi_f_wb: 0.0, saliency_h: f64::NEG_INFINITY };
+    let ParameterGrid { id_a, iq_a, nodes } = ParameterGrid::new(&CurrentGrid::new(&map), &smooth, &least);
+    let (axis, column) = (id_a.iter().position(|id| id.abs() < 1e-9).unwrap(), iq_a.len() - 1);
+    let iq = iq_a[column];
+    for row in [axis - 2, axis - 1, axis] {
+        let (here, id) = (smooth.at(id_a[row], iq), id_a[row]);
+        let chord = (here.psi_d_wb - smooth.at(0.0, iq).psi_d_wb) / id;
+        let ld = if row == axis { here.ldd_h } else { chord };
+        near(nodes[row * iq_a.len() + column].1, here.psi_q_wb / iq - ld, 1e-12);
+    }
+}
+
 #[test]
 fn parameters_are_read_between_nodes() {
     let own =
