@@ -96,7 +96,7 @@ pub fn programs(
     bail!("the build failed {BUILDS} times")
 }
 
-/// What cargo said.
+/// Messages of cargo.
 pub struct Messages {
     pub success: bool,
     lines: Vec<Value>,

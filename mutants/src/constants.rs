@@ -99,7 +99,7 @@ mod tests {
     use crate::tree;
     use std::path::Path;
 
-    /// What a mutant of a constant is compiled as.
+    /// The text that a mutant of a constant is compiled as.
     #[test]
     fn a_constant_is_written_with_its_mutant() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();

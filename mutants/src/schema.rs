@@ -70,7 +70,7 @@ pub fn of(source: &str, sites: &[Site], numbers: &[Vec<u32>]) -> Schema {
     schema
 }
 
-/// What one mutant of a site puts in the place of which bytes, where it is compiled alone.
+/// Bytes of one mutant of a site, and the text in their place, where it is compiled alone.
 pub fn alone(source: &str, site: &Site, index: usize) -> Option<(Bytes, String)> {
     let signed = |right: usize, other: &str| (site.left..right, format!(" {other} "));
     Some(match &site.shape {
