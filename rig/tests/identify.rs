@@ -15,7 +15,7 @@ use tractive_rig::identify::{Identify, Outcome, identified};
 use tractive_rig::machine::Machine;
 use tractive_rig::scenario::catalogue::{self, Chosen};
 use tractive_rig::scenario::traction::identification;
-use tractive_rig::trace::Row;
+use tractive_rig::trace::{Recording, Row};
 use tractive_tablegen::SmoothMap;
 
 /// The words behind `identify`.
@@ -466,26 +466,32 @@ fn new(values: &str, place: &Path, name: &str) -> PathBuf {
     folder
 }
 
+/// The experiment of a nameplate's machine with each of so many seeds: its recording, and the bound of current in A.
+fn driven(values: &str, seeds: u32, judge: impl Fn(u32, &Recording, f64) + Sync) {
+    let place = tempfile::tempdir().unwrap();
+    let machine = Machine::load(new(values, place.path(), "saturates").to_str().unwrap()).unwrap();
+    let parameters = &machine.folder.parameters;
+    let flaws = flaws_of(&machine).join(" ");
+    let stand = identification::Stand { inertia_kg_m2: parameters.rotor_inertia_kg_m2, fault_at_s: None };
+    (1..=seeds).into_par_iter().for_each(|seed| {
+        let options = parsed(&format!("{flaws} --seed {seed}")).options;
+        let recording = identification::drive(&options, &machine, &stand).unwrap();
+        let trip = recording.rows.iter().find_map(|row| row.trip);
+        assert!(trip.is_none(), "seed {seed}: {trip:?}");
+        judge(seed, &recording, parameters.max_current_a);
+    });
+}
+
 /// Iron whose L_q keeps 0.3 of itself: what was seen beyond the bound tells how much less the next pulse is to go. Four seeds: the next two go 14 and 17 % beyond it.
 #[test]
 fn much_saturation_keeps_the_bound_of_current() {
     const VALUES: &str = "--pole-pairs 2 --rs 0.1 --ld 0.5e-3 --lq 3e-3 --psi-f 0 --saturation 0.3 --max-current 30 --udc 48 \
          --max-speed-rpm 3000 --max-switching-hz 16000";
-    let place = tempfile::tempdir().unwrap();
-    let machine = Machine::load(new(VALUES, place.path(), "much").to_str().unwrap()).unwrap();
-    let flaws = flaws_of(&machine).join(" ");
-    let stand = identification::Stand {
-        inertia_kg_m2: machine.folder.parameters.rotor_inertia_kg_m2,
-        fault_at_s: None,
-    };
-    (1..=4).into_par_iter().for_each(|seed| {
-        let options = parsed(&format!("{flaws} --seed {seed}")).options;
-        let recording = identification::drive(&options, &machine, &stand).unwrap();
-        let trip = recording.rows.iter().find_map(|row| row.trip);
+    driven(VALUES, 4, |seed, recording, bound_a| {
         let peak_a = recording.rows.iter().map(|row| row.id_a.hypot(row.iq_a)).fold(0.0, f64::max);
-        let peak_share = peak_a / machine.folder.parameters.max_current_a;
+        let peak_share = peak_a / bound_a;
         println!("seed {seed}: {peak_share:.3} of the bound");
-        assert!(trip.is_none() && peak_share < 1.1, "seed {seed}: {trip:?}, {peak_share} of the bound");
+        assert!(peak_share < 1.1, "seed {seed}: {peak_share} of the bound");
     });
 }
 
@@ -495,26 +501,13 @@ fn much_saturation_keeps_the_bound_of_current() {
 fn the_turning_rotors_current_stays_where_it_is_wanted() {
     const VALUES: &str = "--pole-pairs 5 --rs 0.9 --ld 6e-3 --lq 11e-3 --psi-f 0.18 --saturation 0.35 --max-current 20 --udc 560 \
          --max-speed-rpm 4500 --max-switching-hz 8000";
-    let place = tempfile::tempdir().unwrap();
-    let machine = Machine::load(new(VALUES, place.path(), "turning").to_str().unwrap()).unwrap();
-    let flaws = flaws_of(&machine).join(" ");
-    let stand = identification::Stand {
-        inertia_kg_m2: machine.folder.parameters.rotor_inertia_kg_m2,
-        fault_at_s: None,
-    };
-    (1..=8).into_par_iter().for_each(|seed| {
-        let options = parsed(&format!("{flaws} --seed {seed}")).options;
-        let recording = identification::drive(&options, &machine, &stand).unwrap();
-        let trip = recording.rows.iter().find_map(|row| row.trip);
+    driven(VALUES, 8, |seed, recording, bound_a| {
         let turning = recording.observations.iter().filter(|o| o.stage == Stage::Turn);
         let (peak_a, count) =
             turning.fold((0.0_f32, 0), |(most, n), o| (most.max(o.current.length()), n + 1));
-        let peak_share = f64::from(peak_a) / machine.folder.parameters.max_current_a;
+        let peak_share = f64::from(peak_a) / bound_a;
         println!("seed {seed}: {peak_share:.3} of the bound, {count} observations");
-        assert!(
-            trip.is_none() && count > 100 && peak_share < 0.5,
-            "seed {seed}: {trip:?}, {peak_share} of the bound"
-        );
+        assert!(count > 100 && peak_share < 0.5, "seed {seed}: {peak_share} of the bound");
     });
 }
 
