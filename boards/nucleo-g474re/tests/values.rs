@@ -8,6 +8,7 @@ use nucleo_g474re::zs9::feedback::{decoded, encoded};
 use nucleo_g474re::zs9::period::{LegCompares, PeriodCompares};
 use nucleo_g474re::zs9::{HALF_CYCLES, settings};
 use tractive::drive::traction::{Drops, Settings};
+use tractive::machine::Ratings;
 use tractive::nine_switch::GateTicks;
 use tractive::ports::{GateFeedback, PlayedPeriod};
 
@@ -145,6 +146,8 @@ fn settings_of_a_stage_have_its_times() {
     assert_eq!(got.angle_step_rad, Settings::step_rad(stage.encoder_counts, ratings.pole_pairs));
     let short = PowerStage { current_filter_s: 0.6 / got.clock.ticks_per_s, ..stage };
     assert_eq!(short.settings(ratings).current_filter_ticks, 1, "to the nearest tick");
+    let known = Ratings { iron_share: 0.5, ..*ratings };
+    assert_eq!(stage.settings(&known).iron_share, 0.5, "the machine's iron loss is made up for");
     let usual = POWER_STAGE.settings(ratings);
     assert_eq!(
         format!("{:?} {:?}", got.clock, got.devices),
