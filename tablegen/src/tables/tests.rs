@@ -65,8 +65,7 @@ fn parameters_of_a_linear_machine_are_constants() {
     }
 }
 
-/// A surface that is bilinear itself is read exactly, beyond the grid too.
-/// The static inductance along d is the chord from no current along d on, from the next node on, too; on the axis itself the incremental one.
+/// The static inductance along d is the chord from no current along d, beside the axis too; on the axis itself it is the incremental one.
 #[test]
 fn static_inductances_of_a_curved_machine_are_chords() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tables/pmasynrm-180kw");
@@ -84,6 +83,7 @@ fn static_inductances_of_a_curved_machine_are_chords() {
     }
 }
 
+/// A surface that is bilinear itself is read exactly, beyond the grid too.
 #[test]
 fn parameters_are_read_between_nodes() {
     let own =
