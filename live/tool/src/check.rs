@@ -245,6 +245,14 @@ fn saves(browser: &mut Browser) -> Result<()> {
 
 /// Scenarios in the page make the host's bytes, and its verdicts; what the host refuses is refused.
 fn equal_the_host(browser: &mut Browser, rig: &Path, lines: &[&str]) -> Result<()> {
+    let offered = browser
+        .evaluate("[...document.querySelector('select[aria-label=Scenario]').options].map(of => of.value)")?;
+    for name in offered.as_array().into_iter().flatten().filter_map(Value::as_str) {
+        ensure!(
+            lines.iter().any(|line| line.split(' ').next() == Some(name)),
+            "{name}: not compared with the host"
+        );
+    }
     let out = tempfile::tempdir()?;
     for line in lines {
         let words = line.split(' ').collect::<Vec<_>>();
