@@ -43,19 +43,33 @@ fn keeps_its_place(outcome: &Outcome) {
 
 const FLAWS: &str = "--noise-a 0.5 --dead-time-us 5 --uncompensated --rs-error 10 --inertia 3";
 
+/// Seeds 15 and 74 make pulses that leave the corner of +d and much i_q least known: a map that bends too freely falls there.
 #[test]
 fn the_reference_machine_with_noise_dead_time_and_a_wrong_resistance() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
-    let found = outcome(&machine, FLAWS);
-    keeps_its_place(&found);
-    assert!(found.flux_rms < 0.005, "{}", found.flux_rms);
-    assert!(found.flux_worst < 0.012, "{}", found.flux_worst);
-    assert!(found.torque_worst < 0.01, "{}", found.torque_worst);
-    assert!(found.magnet_error.abs() < 0.005, "{}", found.magnet_error);
-    assert!(found.resistance_error.abs() < 0.01, "{}", found.resistance_error);
-    // Dead time and threshold together: 5 µs of 1,500 V in each half, and no threshold.
-    assert!((found.lacking_v.0 / 6.75 - 1.0).abs() < 0.03, "{:?}", found.lacking_v);
-    assert!((found.rotor.inertia_kg_m2 / 3.0 - 1.0).abs() < 0.01, "{}", found.rotor.inertia_kg_m2);
+    [1, 15, 74].par_iter().for_each(|seed| {
+        let found = outcome(&machine, &format!("{FLAWS} --seed {seed}"));
+        keeps_its_place(&found);
+        assert!(found.flux_rms < 0.005, "{seed}: {}", found.flux_rms);
+        assert!(found.flux_worst < 0.012, "{seed}: {}", found.flux_worst);
+        assert!(found.torque_worst < 0.01, "{seed}: {}", found.torque_worst);
+        assert!(found.magnet_error.abs() < 0.005, "{seed}: {}", found.magnet_error);
+        assert!(found.resistance_error.abs() < 0.01, "{seed}: {}", found.resistance_error);
+        // Dead time and threshold together: 5 µs of 1,500 V in each half, and no threshold.
+        assert!((found.lacking_v.0 / 6.75 - 1.0).abs() < 0.03, "{seed}: {:?}", found.lacking_v);
+        assert!(
+            (found.rotor.inertia_kg_m2 / 3.0 - 1.0).abs() < 0.01,
+            "{seed}: {}",
+            found.rotor.inertia_kg_m2
+        );
+        let map = found.fit.map(machine.folder.parameters.max_current_a);
+        let columns = map.iq_a.len();
+        let rises =
+            |of: &[f64], step: usize| of.iter().zip(&of[step..]).map(|(a, b)| b - a).fold(f64::MAX, f64::min);
+        let along_q = map.psi_q_wb.chunks(columns).map(|row| rises(row, 1)).fold(f64::MAX, f64::min);
+        let along_d = rises(&map.psi_d_wb, columns);
+        assert!(along_d > 0.0 && along_q > 0.0, "{seed}: {along_d}, {along_q}");
+    });
 }
 
 /// Devices that conduct, in proportion to a link's voltage and a machine's current: what the reference machine's have.

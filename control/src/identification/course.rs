@@ -197,7 +197,6 @@ impl Course {
         }
         let back_share = match self.stage {
             Stage::Staircase | Stage::AlongD => self.pulses.back_share(pole_pairs),
-            Stage::AlongQ | Stage::AlongBoth => self.pulses.mean_share(pole_pairs),
             _ => 0.0,
         };
         self.zero.turn(back_share, mean.d / bound_a, seen.length_s);

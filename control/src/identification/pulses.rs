@@ -62,8 +62,6 @@ const POSITIVE_SHARE: f32 = 0.2;
 const MOST_RAD: f32 = 0.028;
 const AHEAD_HALVES: f32 = 6.0;
 const AHEAD_S: f32 = 0.02;
-/// Mean current over the bound of pulses whose one side is given no more: triangles of one sign.
-const MEAN_SHARE: f32 = 0.25;
 /// Least share of the bound that a side keeps.
 const LEAST_SIDE: f32 = 0.1;
 /// Current along q that takes the rotor back beside currents along d, as a share of the bound: at the most turn that there is to be, and at most,
@@ -116,12 +114,6 @@ impl Pulses {
     pub fn back_share(&self, pole_pairs: f32) -> f32 {
         let away = self.away(pole_pairs, BACK_S);
         limit(-BACK_GAIN * (away - limit(away, -STAYS, STAYS)), -BACK_SHARE, BACK_SHARE)
-    }
-
-    /// The same of pulses along q, whose sides leave a mean.
-    pub fn mean_share(&self, pole_pairs: f32) -> f32 {
-        let ahead_s = AHEAD_HALVES * self.length_s + AHEAD_S;
-        -MEAN_SHARE * limit(self.away(pole_pairs, ahead_s), -1.0, 1.0)
     }
 
     /// Notes the length of a half, in s.

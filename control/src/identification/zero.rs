@@ -23,7 +23,8 @@ impl Zero {
     }
 
     /// Turns the frame while a current along q, over the bound, is needed beside so much along d, over the bound, to keep the rotor where it is: by
-    /// least squares over all of them, so that it is quick at first, and hardly follows the swings of the pulses.
+    /// least squares over all of them, so that it is quick at first. Swings by pulses along q are their own torque's and show no zero: what they
+    /// taught turned the frame, and with it the current along d, which made the swings grow.
     pub fn turn(&mut self, back_share: f32, d_share: f32, length_s: f32) {
         if back_share == 0.0 {
             return;
