@@ -43,11 +43,11 @@ fn keeps_its_place(outcome: &Outcome) {
 
 const FLAWS: &str = "--noise-a 0.5 --dead-time-us 5 --uncompensated --rs-error 10 --inertia 3";
 
-/// Seeds 15 and 74 make pulses that leave the corner of +d and much i_q least known: a map that bends too freely falls there.
+/// Seeds 50 and 83 leave the corner of +d and much i_q least known: a map that bends too freely falls there. 15 has edges of unsure signs.
 #[test]
 fn the_reference_machine_with_noise_dead_time_and_a_wrong_resistance() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
-    [1, 15, 74].par_iter().for_each(|seed| {
+    [1, 15, 50, 83].par_iter().for_each(|seed| {
         let found = outcome(&machine, &format!("{FLAWS} --seed {seed}"));
         keeps_its_place(&found);
         assert!(found.flux_rms < 0.005, "{seed}: {}", found.flux_rms);
