@@ -104,9 +104,8 @@ const ALONG_Q: u32 = 400;
 const ALONG_BOTH: u32 = 2_300;
 const REST: u32 = 16;
 
-/// Share of the bound at which the pulses along q begin, and what each command adds to it.
-const FIRST_BOUND: f32 = 0.2;
-const WIDENING: f32 = 0.003;
+/// Shares of the bound at which the pulses along d and along q begin.
+const FIRST_SHARES: [f32; 2] = [0.5, 0.2];
 
 /// Current along d beside the pulses along q and of the turning rotor, as a share of the bound: no phase is without current for long. Beside
 /// the last pulses it goes to and fro between two shares. Ways in a command, at first and growing by as much with each command: no two ways
@@ -272,9 +271,8 @@ impl Course {
         if before == Stage::AlongD && self.stage != before {
             inductance.settle(FLOOR_SHARES[1]);
         }
-        let region = |share: f32, held: Dq| Region {
+        let region = |held: Dq| Region {
             along_q: self.stage != Stage::AlongD,
-            share,
             held: held * bound_a,
             bound_a,
             reach,
@@ -295,17 +293,15 @@ impl Course {
             }
             Stage::AlongD => {
                 let back = Dq { d: 0.0, q: self.pulses.back_share(ratings.pole_pairs) };
-                let region = region(1.0, back);
+                let region = region(back);
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::AlongQ => {
-                // Outward step by step, so that each step is known from the one before it.
-                let share = limit(FIRST_BOUND + self.commands as f32 * WIDENING, FIRST_BOUND, 1.0);
-                let region = region(share, Dq { d: HELD_D, q: 0.0 });
+                let region = region(Dq { d: HELD_D, q: 0.0 });
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::AlongBoth => {
-                let region = region(1.0, Dq { d: self.swept() * self.pulses.kept(), q: 0.0 });
+                let region = region(Dq { d: self.swept() * self.pulses.share(), q: 0.0 });
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::Done if self.step > 0 => NONE,
@@ -362,10 +358,14 @@ impl Course {
                 (self.commands, self.step) = (0, self.step + 1);
                 if self.step as usize == STAIRCASE.len() {
                     self.settle(ratings.max_current_a);
+                    self.pulses.begin(FIRST_SHARES[0]);
                     self.enter(Stage::AlongD);
                 }
             }
-            Stage::AlongD if after(ALONG_D) => self.enter(Stage::AlongQ),
+            Stage::AlongD if after(ALONG_D) => {
+                self.pulses.begin(FIRST_SHARES[1]);
+                self.enter(Stage::AlongQ);
+            }
             Stage::AlongQ if after(ALONG_Q) => self.enter(Stage::AlongBoth),
             Stage::AlongBoth if after(ALONG_BOTH) => self.enter(Stage::Rest),
             Stage::Rest if after(REST) => self.enter(Stage::Turn),

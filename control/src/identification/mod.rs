@@ -55,6 +55,9 @@ pub struct Identification {
     inductance: Inductance,
     /// The current of the newest boundary in A, and the direction of the rotor's d axis there as the angle says.
     last: Option<(Dq, SinCos)>,
+    /// The current in the middle of the way that the newest command makes, in A: its inductance is the way's. By that of the way's beginning 13 of 56
+    /// experiments with an L_q that falls to 0.4 of itself go a tenth beyond the bound, none by this one.
+    middle: Dq,
     told: Option<Observation>,
     gathered: Gathered,
     /// Samples since the last operating point.
@@ -74,6 +77,7 @@ impl Identification {
             course: Course::new(),
             inductance: Inductance::UNKNOWN,
             last: None,
+            middle: NONE,
             told: None,
             gathered: Gathered::NOTHING,
             samples: 0,
@@ -193,13 +197,15 @@ impl ControlLaw for Identification {
         let voltage = committed.volt_seconds.map_or(NONE, |volt_seconds| {
             let interval_s = committed.interval_s;
             let bound_a = law.tables.ratings.max_current_a;
-            self.inductance.at(here, bound_a);
+            self.inductance.at(self.middle, bound_a);
             let left = self.course.drop_v(here, frame) * committed.horizon_s;
             let ahead = here + self.inductance.current(volt_seconds.park(frame) - left);
             self.inductance.at(ahead, bound_a);
             let reach = self.limit_v * interval_s;
             self.course.lasts(interval_s);
             let change = self.course.change(ahead, reach, &mut self.inductance, &law.tables.ratings);
+            self.middle = ahead + change * 0.5;
+            self.inductance.at(self.middle, bound_a);
             self.voltage(ahead, change, frame, interval_s)
         });
         let (length_v, vector): (f32, AlphaBeta) = (voltage.length(), voltage.unpark(frame));

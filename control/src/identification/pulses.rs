@@ -9,8 +9,6 @@ use crate::machine::Ratings;
 pub struct Region<'a> {
     /// Pulses along q, or else along d.
     pub along_q: bool,
-    /// Share of the bound that is used.
-    pub share: f32,
     /// The current where an axis without pulses is held, in A.
     pub held: Dq,
     /// Largest current, in A.
@@ -32,29 +30,30 @@ pub struct Pulses {
     omega: f32,
     /// Length of a half, in s.
     length_s: f32,
-    /// Share of the bound that the current has come into; and the part of it that the boundaries' currents keep to.
+    /// Share of the bound that the next pulse may come to; and the one that the current has come into.
     share: f32,
-    kept: f32,
+    within: f32,
 }
 
 /// Change of current of a command, as a share of the bound: along d alone, along q, and along d beside q.
 const D_SHARE: f32 = 0.06;
-const Q_SHARE: f32 = 0.065;
+const Q_SHARE: f32 = 0.058;
 const SLOW_SHARE: f32 = 0.017;
 /// Share of the volt-seconds that d takes at most.
 const D_REACH: f32 = 0.7;
 /// Share of the way to where an axis without pulses is held that a command goes.
 const HELD_SHARE: f32 = 0.4;
-/// Share of the bound that the boundaries' currents keep to: between them there is ripple. By how much less they keep to, over what a current
-/// was seen beyond its bound and more than is tolerated: where iron saturates much the next one may go further. And the least that they keep to.
-const KEPT_SHARE: f32 = 0.956;
-const OVER_GAIN: f32 = 3.0;
-const LEAST_KEPT_SHARE: f32 = 0.75;
+/// Part of their share of the bound that the boundaries' currents keep to: between them there is ripple. What each command adds to the share:
+/// outward step by step, so that each step is known from the one before it. By how much less it becomes, over what a current was seen beyond it
+/// and more than is tolerated: where iron saturates much the next pulse may go further.
+const KEPT_SHARE: f32 = 0.964;
+const WIDENING: f32 = 0.003;
+const OVER_GAIN: f32 = 8.0;
 const TOLERATED_SHARE: f32 = 0.02;
-/// Share of the bound within which a change of current is too coarse to tell.
+/// Share of the bound within which a change of current is too coarse to tell: the least that this leaves.
 const FAR_SHARE: f32 = 0.6;
 /// The change along q that a command may make where the iron saturates as the current goes outward, over the one that it is to make.
-const OUTWARD: f32 = 1.4;
+const OUTWARD: f32 = 1.7;
 /// Largest current along +d, as a share of the bound.
 const POSITIVE_SHARE: f32 = 0.2;
 /// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts: so many halves, for the
@@ -75,7 +74,7 @@ const BACK_SHARE: f32 = 0.15;
 impl Pulses {
     /// Before the first pulse.
     pub const fn new() -> Self {
-        Self { d: -1.0, q: 1.0, turned_rad: 0.0, omega: 0.0, length_s: 1.0, share: 1.0, kept: KEPT_SHARE }
+        Self { d: -1.0, q: 1.0, turned_rad: 0.0, omega: 0.0, length_s: 1.0, share: 1.0, within: 1.0 }
     }
 
     /// A number of this a half, per s.
@@ -83,16 +82,21 @@ impl Pulses {
         number / self.length_s
     }
 
-    /// The part of [`KEPT_SHARE`] that the boundaries' currents keep to, as none has gone further yet than it should.
-    pub fn kept(&self) -> f32 {
-        self.kept / KEPT_SHARE
+    /// Begins with pulses that come to a share of the bound.
+    pub fn begin(&mut self, share: f32) {
+        (self.share, self.within) = (share, share);
+    }
+
+    /// The share of the bound that the next pulse may come to.
+    pub fn share(&self) -> f32 {
+        self.share
     }
 
     /// Notes by how much the rotor has turned in a half, and whether the current has gone beyond its bound, in A.
     pub fn turned(&mut self, seen: &Seen, bound_a: f32) {
-        let kept = KEPT_SHARE - OVER_GAIN * (seen.current.length() / bound_a - self.share - TOLERATED_SHARE);
-        if self.share > FAR_SHARE && kept < self.kept {
-            self.kept = if kept > LEAST_KEPT_SHARE { kept } else { LEAST_KEPT_SHARE };
+        let over = seen.current.length() / bound_a - self.within - TOLERATED_SHARE;
+        if self.within > FAR_SHARE && over > 0.0 {
+            self.share = limit(self.within - OVER_GAIN * over, FAR_SHARE, self.share);
         }
         self.turned_rad += seen.turned;
         self.omega = seen.omega;
@@ -123,9 +127,9 @@ impl Pulses {
 
     /// The change of current that the command is to make from what flows `ahead`: on as before, unless that would leave the region.
     pub fn change(&mut self, ahead: Dq, region: &Region, inductance: &Inductance) -> Dq {
-        let bound_a = region.share * self.kept * region.bound_a;
+        let bound_a = self.share * KEPT_SHARE * region.bound_a;
         if ahead.squared() <= bound_a * bound_a {
-            self.share = region.share;
+            self.within = self.share;
         }
         let inside = |Dq { d, q }: Dq| (ahead + Dq { d, q: q * OUTWARD }).squared() <= bound_a * bound_a;
         let before = self.along(region);
@@ -148,6 +152,7 @@ impl Pulses {
             self.turn_to(inward, region);
             change = self.wanted(ahead, region, inductance);
         }
+        self.share = limit(self.share + WIDENING, 0.0, 1.0);
         change
     }
 
@@ -178,7 +183,7 @@ impl Pulses {
     fn sides(&self, region: &Region) -> [f32; 2] {
         let share = self.away(region.ratings.pole_pairs, AHEAD_HALVES * self.length_s + AHEAD_S);
         [1.0 + share, 1.0 - share]
-            .map(|side| limit(side, LEAST_SIDE, 1.0) * region.share * self.kept * region.bound_a)
+            .map(|side| limit(side, LEAST_SIDE, 1.0) * self.share * KEPT_SHARE * region.bound_a)
     }
 }
 

@@ -23,7 +23,7 @@ const ONWARD: f64 = 3.5e-5;
 /// Weight of what is known for sure beside a sample's residual.
 const SURE: f64 = 1e3;
 /// Phase current, as a share of the bound, whose sign is not sure.
-const SMALL_SHARE: f64 = 0.012;
+const SMALL_SHARE: f64 = 0.015;
 /// Rounds in which ripple, inductances and the angle's zero find each other: at least, at most, and the change of the zero, in rad, below
 /// which they have.
 const LEAST_ROUNDS: u32 = 2;
