@@ -2,12 +2,28 @@
 
 use crate::frames::{Dq, limit};
 
-/// A symmetric matrix of inductances, in H.
+/// A symmetric matrix of inductances, in H: 0 along an axis of which nothing is known, and the coupling with q.
 #[derive(Clone, Copy, Debug)]
 struct Matrix {
     dd: f32,
     dq: f32,
     qq: f32,
+}
+
+impl Matrix {
+    const NOTHING: Self = Self { dd: 0.0, dq: 0.0, qq: 0.0 };
+
+    /// This one with all that another knows in its place.
+    fn and(self, other: Self) -> Self {
+        self.with(other, [other.dd > 0.0, other.qq > 0.0])
+    }
+
+    /// This one with another's along d, and along q, in its place.
+    fn with(self, other: Self, [d, q]: [bool; 2]) -> Self {
+        let dd = if d { other.dd } else { self.dd };
+        let [dq, qq] = if q { [other.dq, other.qq] } else { [self.dq, self.qq] };
+        Self { dd, dq, qq }
+    }
 }
 
 /// Share of what a half shows that is believed at once.
@@ -29,37 +45,15 @@ const PER_BOUND: f32 = 6.5;
 /// Place of no current along d.
 const MIDDLE_D: f32 = 7.0;
 
-/// Parts of the matrix that a change of current along d, and one along q, have shown somewhere.
-#[derive(Clone, Copy, Debug)]
-struct Known {
-    dd: Option<f32>,
-    dq_qq: Option<[f32; 2]>,
-}
-
-impl Known {
-    const NOTHING: Self = Self { dd: None, dq_qq: None };
-
-    /// A matrix with what is known in its place.
-    fn over(self, Matrix { dd, dq, qq }: Matrix) -> Matrix {
-        let [dq, qq] = self.dq_qq.unwrap_or([dq, qq]);
-        Matrix { dd: self.dd.unwrap_or(dd), dq, qq }
-    }
-
-    /// The same, with what a change of current has shown of a matrix: along d, along q.
-    fn with(self, Matrix { dd, dq, qq }: Matrix, [d, q]: [bool; 2]) -> Self {
-        Self { dd: if d { Some(dd) } else { self.dd }, dq_qq: if q { Some([dq, qq]) } else { self.dq_qq } }
-    }
-}
-
 /// Inductances all over the plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Inductance {
     /// The one of the present current.
     here: Matrix,
     field: usize,
-    fields: [Known; ALONG_D * ALONG_Q],
+    fields: [Matrix; ALONG_D * ALONG_Q],
     /// The newest of each current along q, whatever flows along d: iron saturates along q with it.
-    along_q: [Known; ALONG_Q],
+    along_q: [Matrix; ALONG_Q],
     /// Share of the coupling that acts here: odd in the current along q.
     coupled: f32,
     /// The least own inductances, in H.
@@ -76,8 +70,8 @@ impl Inductance {
         Self {
             here,
             field: usize::MAX,
-            fields: [Known::NOTHING; ALONG_D * ALONG_Q],
-            along_q: [Known::NOTHING; ALONG_Q],
+            fields: [Matrix::NOTHING; ALONG_D * ALONG_Q],
+            along_q: [Matrix::NOTHING; ALONG_Q],
             coupled: 1.0,
             floor_h: Dq { d: 0.0, q: 0.0 },
         }
@@ -103,9 +97,9 @@ impl Inductance {
     pub fn settle(&mut self, share: f32) {
         let mut least_h = self.here.dd;
         // Without current along q: the first field of each row.
-        for dd in self.fields.iter().step_by(ALONG_Q).filter_map(|known| known.dd) {
-            if dd < least_h {
-                least_h = dd;
+        for Matrix { dd, .. } in self.fields.iter().step_by(ALONG_Q) {
+            if *dd > 0.0 && *dd < least_h {
+                least_h = *dd;
             }
         }
         self.floor_h = Dq { d: share * least_h, q: FLOOR_SHARE * least_h };
@@ -122,9 +116,8 @@ impl Inductance {
         let field = row * ALONG_Q + column;
         if field != self.field {
             self.field = field;
-            for known in [self.along_q.get(column), self.fields.get(field)].into_iter().flatten() {
-                self.here = known.over(self.here);
-            }
+            let known = |of: &[Matrix], place: usize| of.get(place).copied().unwrap_or(Matrix::NOTHING);
+            self.here = self.here.and(known(&self.along_q, column)).and(known(&self.fields, field));
         }
     }
 
@@ -178,9 +171,11 @@ impl Inductance {
         // A part that no change has shown is not remembered: elsewhere it would stand for what is known better. Of 56 experiments with an L_q that
         // falls to 0.4 of itself 5 would go a tenth beyond the bound.
         let shown = [d * d > noise, q * q > noise];
-        let (field, column) = (self.fields.get_mut(self.field), self.along_q.get_mut(self.field % ALONG_Q));
-        for known in [field, column].into_iter().flatten() {
-            *known = known.with(self.here, shown);
+        if let Some(field) = self.fields.get_mut(self.field) {
+            *field = field.with(self.here, shown);
+        }
+        if let Some(column) = self.along_q.get_mut(self.field % ALONG_Q) {
+            *column = column.with(self.here, shown);
         }
     }
 }
