@@ -279,7 +279,7 @@ const fn check_weakening(weakening: &Weakening, ratings: &Ratings) -> Result<(),
     let Curve { first, inverse_step, nodes: values } = *torque;
     // The flux that the lowest link leaves at the highest speed is on the table, and a good deal more.
     let least_wb = FRAC_2_PI * ratings.dc_link_min_v / (ratings.max_speed_rad_s * ratings.pole_pairs);
-    checked!(within(&[Bound("weakening.flux_knee_wb", *knee_wb, 0.03 * least_wb, 100.0 * least_wb)]));
+    checked!(within(&[Bound("weakening.flux_knee_wb", *knee_wb, 3e-4 * least_wb, 100.0 * least_wb)]));
     checked!(within(&[Bound("weakening.share_knee", *share_knee, 0.03, 30.0)]));
     let axis = Axis {
         names: ["weakening.torque.first", "weakening.torque.inverse_step", "weakening.torque.nodes"],

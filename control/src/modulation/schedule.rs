@@ -199,12 +199,16 @@ impl Schedule {
             return Mode::Async;
         }
         let notch = shortest_notch(seen.rate, devices);
+        // A free carrier gives way to a locked one first, which leads the flux to where a pattern begins: from a free one it begins at any angle, and
+        // a machine of 12 kHz that weakened there had a third more current.
+        let free = mode == Mode::Async;
         let passes = |below: Mode, from_above: bool| {
             let row = below.row();
             // Modes of one number of pulses are told apart by modulation index alone.
             let faster = !from_above || row.until.shares != mode.row().until.shares;
             faster && share >= pick(row.until.shares, from_above)
-                || seen.modulation_index >= pick(reached(row, notch), from_above)
+                || !(free && below.is_carrier())
+                    && seen.modulation_index >= pick(reached(row, notch), from_above)
         };
         // From where the drive stands: up past every border that is passed, else down past those that no longer are.
         let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
@@ -411,6 +415,33 @@ mod tests {
                 let got = Schedule::new(&clock).wanted(Instant(0), mode, &at(share), &devices);
                 assert_eq!(got == Mode::Async, wanted, "{mode:?} at {share}");
             }
+        }
+    }
+
+    /// Whatever the modulation index, the free carrier gives way to a locked one where that still has its frequency; a locked one gives way by index.
+    #[test]
+    fn a_free_carrier_gives_way_to_a_locked_one() {
+        let devices = SwitchLimits { min_pulse_ticks: 250, dead_time_ticks: 0, shortest_half_ticks: 1 << 14 };
+        let clock = Clock::new(25_000_000, 2_500);
+        for (mode, share, index, wanted) in [
+            (Mode::Async, 0.05, 0.97, Mode::Sync15),
+            (Mode::Async, 0.07, 0.97, Mode::Sync12),
+            (Mode::Async, 0.09, 0.97, Mode::Mid3),
+            (Mode::Off, 0.05, 0.97, Mode::Mid3),
+            (Mode::Sync15, 0.05, 0.97, Mode::Mid3),
+            (Mode::Sync15, 0.05, 0.5, Mode::Sync15),
+        ] {
+            let seen = Reference {
+                rate: share * 131_072.0,
+                udc_v: 1_500.0,
+                modulation_index: index,
+                ..Reference::NONE
+            };
+            assert_eq!(
+                Schedule::new(&clock).wanted(Instant(0), mode, &seen, &devices),
+                wanted,
+                "{mode:?} {share} {index}"
+            );
         }
     }
 
