@@ -20,6 +20,9 @@ const DEPTH_PER_TORQUE: f32 = 0.4;
 /// Time constant of the torque that is told, in s: half of telemetry's period.
 const TOLD_S: f32 = 0.005;
 
+/// Least flux linkage that tells of the map's error, over the knee of the weakening tables: 0.07 of what full torque needs.
+const TELLING: f32 = 0.2;
+
 /// The target of the current loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -323,6 +326,7 @@ impl Controller {
             explained: 1.0 - link_scale,
             current: point.current,
             flux: point.flux,
+            least_wb: TELLING * law.tables.weakening.flux_knee_wb,
             omega: self.speed.omega(),
             period_s,
             resistance_from: law.gains.resistance_from,

@@ -36,6 +36,8 @@ pub struct Input {
     pub current: Dq,
     /// Flux linkage, in Wb.
     pub flux: Dq,
+    /// The least that tells something, in Wb.
+    pub least_wb: f32,
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
     /// The time, in s.
@@ -109,16 +111,22 @@ impl MapError {
     /// A time with a mean disturbance.
     pub fn step(&mut self, input: &Input) {
         let Input {
-            disturbance, current, flux, omega, period_s, resistance_from, largest_a, fastest, ..
+            disturbance,
+            current,
+            flux,
+            least_wb,
+            omega,
+            period_s,
+            resistance_from,
+            largest_a,
+            fastest,
+            ..
         } = *input;
-        if omega.abs() < resistance_from * (FROM * fastest) {
+        // A machine with hardly any flux linkage, as one of reluctance alone with hardly a current, has nothing to tell by either.
+        if omega.abs() < resistance_from * (FROM * fastest) || flux.squared() < least_wb * least_wb {
             return;
         }
         let seen = share_of(disturbance, omega, current, flux, resistance_from * largest_a);
-        // A machine without flux linkage, as one of reluctance alone without a current, has nothing to tell by.
-        if !seen.is_finite() {
-            return;
-        }
         self.share += BANDWIDTH_RAD_S * period_s * (seen + input.explained - self.explained - self.share);
         self.believe();
     }
@@ -152,6 +160,7 @@ mod tests {
                 explained: 0.0,
                 current,
                 flux: FLUX,
+                least_wb: 0.03,
                 omega,
                 period_s: 1e-3,
                 resistance_from: 0.15,
@@ -174,19 +183,23 @@ mod tests {
 
     #[test]
     fn without_flux_linkage_nothing_is_told() {
-        let mut error = MapError::new();
-        error.step(&Input {
-            disturbance: Dq { d: 3.0, q: -2.0 },
-            explained: 0.0,
-            current: Dq { d: 0.0, q: 0.0 },
-            flux: Dq { d: 0.0, q: 0.0 },
-            omega: 300.0,
-            period_s: 1e-3,
-            resistance_from: 0.15,
-            largest_a: 267.0,
-            fastest: 1_500.0,
-        });
-        assert_eq!((error.share(), error.link_scale(), error.scales()), (0.0, 1.0, Scales::NONE));
+        for flux_wb in [0.0, 1e-15, 0.029] {
+            let mut error = MapError::new();
+            error.step(&Input {
+                disturbance: Dq { d: 3.0, q: -2.0 },
+                explained: 0.0,
+                current: Dq { d: 0.0, q: 0.0 },
+                flux: Dq { d: flux_wb, q: 0.0 },
+                least_wb: 0.03,
+                omega: 300.0,
+                period_s: 1e-3,
+                resistance_from: 0.15,
+                largest_a: 267.0,
+                fastest: 1_500.0,
+            });
+            let found = (error.share(), error.link_scale(), error.scales());
+            assert_eq!(found, (0.0, 1.0, Scales::NONE), "{flux_wb} Wb");
+        }
     }
 
     /// A drive that makes use of the link's scale, in front of a machine with this share of more flux linkage: the estimate after two seconds,
@@ -200,6 +213,7 @@ mod tests {
                 explained: 1.0 - scale,
                 current: CURRENT,
                 flux: FLUX,
+                least_wb: 0.03,
                 omega,
                 period_s: 1e-3,
                 resistance_from: 0.15,
