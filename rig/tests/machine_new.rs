@@ -90,7 +90,7 @@ fn a_machine_of_round_numbers_is_taken() {
     }
 }
 
-/// A link with thousands of times the voltage that the largest speed needs: no drive takes such tables, so no folder is made.
+/// A link with more than a thousand times the voltage that the largest speed needs: no drive takes such tables, so no folder is made.
 #[test]
 fn what_the_drive_would_refuse_is_not_written() {
     let folder = tempfile::tempdir().unwrap();

@@ -35,7 +35,7 @@ pub fn folder(out: &Path, contents: &Contents) -> Result<()> {
         read.tables().check().map_err(|refused| {
             let why = match (refused.name, refused.value < refused.least) {
                 ("weakening.flux_knee_wb", true) => {
-                    "; the link has thousands of times the voltage that the largest speed needs"
+                    "; the link has more than a thousand times the voltage that the largest speed needs"
                 }
                 ("weakening.flux_knee_wb", false) => {
                     "; are inductances in H, flux linkages in Wb? The link has a hundredth of their voltage"
