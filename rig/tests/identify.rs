@@ -43,7 +43,8 @@ fn keeps_its_place(outcome: &Outcome) {
 
 const FLAWS: &str = "--noise-a 0.5 --dead-time-us 5 --uncompensated --rs-error 10 --inertia 3";
 
-/// Seeds 50 and 83 leave the corner of +d and much i_q least known: a map that bends too freely falls there. 15 has edges of unsure signs.
+/// Four seeds. By an earlier law of the pulses 50 and 83 left the corner of +d and much i_q so little known that the map fell there, and 15 missed the bound
+/// of flux linkage by its edges of unsure signs.
 #[test]
 fn the_reference_machine_with_noise_dead_time_and_a_wrong_resistance() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
