@@ -64,6 +64,16 @@ fn a_machine_of_reluctance_alone_keeps_its_torque() {
     );
 }
 
+/// Of a machine whose locked carriers have halves of half a control period a command acts for two of them. Taken for one, it took away twice its error, and the
+/// machine tripped at 5,332 r/min.
+#[test]
+fn a_locked_carrier_as_fast_as_control_keeps_its_current() {
+    keeps_its_bounds(
+        "--pole-pairs 5 --rs 0.0125 --ld 180e-6 --lq 180e-6 --psi-f 0.0834 --max-current 258 --udc 560 --max-speed-rpm 6000 --max-switching-hz 10000",
+        &[("sweep", 4), ("load-steps", 4), ("full-step", 4), ("reversal", 2), ("link-steps", 1)],
+    );
+}
+
 /// A car's machine that weakens below the end of its free carrier: a locked carrier leads its flux linkage to where the pattern of three pulses begins.
 /// The free carrier's own end, at any angle, was 34 % of current more than either mode has, and an overcurrent.
 #[test]

@@ -143,12 +143,12 @@ pub(super) struct Wanted<'a> {
 pub(super) fn interval_s(mode: Mode, omega: f32, settings: &Settings) -> f32 {
     let Settings { clock, devices, .. } = settings;
     let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
-    match mode.carriers() {
-        // A command acts for a control period at least.
-        0 if shortest_s < clock.control_s => clock.control_s,
+    let half_s = match mode.carriers() {
         0 => shortest_s,
         carriers => core::f32::consts::PI / (carriers as f32 * omega.abs()),
-    }
+    };
+    // A carrier's command acts for a control period at least.
+    if mode.is_carrier() && half_s < clock.control_s { clock.control_s } else { half_s }
 }
 
 /// The modulator's pulses from `now`, the instant of the currents, until a command of this period can act.

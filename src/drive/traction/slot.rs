@@ -40,7 +40,7 @@ pub(super) struct Slot {
     pub commands: bool,
     /// `true` if it uses that of the next one.
     pub aims: bool,
-    /// Halves of a free carrier between the one that is committed already and the first of this command: those of the command before.
+    /// Halves of a triangular carrier between the one that is committed already and the first of this command: those of the command before.
     pub between: u32,
 }
 
@@ -72,7 +72,7 @@ impl Slot {
         let left = later(halves).since(valid);
         let commands = left < period as i32;
         // A pattern's half of less than two periods, which is rare, counts as if this command were in time for the next boundary.
-        let between = if commands && !newest.half.is_free() { 0 } else { halves };
+        let between = if commands && !newest.half.is_carried() { 0 } else { halves };
         let mode = if between == 0 { next } else { next_but_one };
         Self {
             now,
