@@ -444,7 +444,7 @@ fn aimed_share(share: f32) -> f32 {
     let most_nm = operating_point(1e4, omega, &limit, tables).torque_nm;
     let demand = Demand { torque_nm: share * most_nm, slew_limited: false };
     let volt_seconds = Some(AlphaBeta::default());
-    let committed = Committed { horizon_s: 0.0, volt_seconds, ripple: None, interval_s: 0.5e-3 };
+    let committed = Committed { horizon_s: 0.0, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };
     let mut controller = Controller::new();
     for period in 0..10_000_u16 {
         let angle = Angle::from_turns(turns * f32::from(period));

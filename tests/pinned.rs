@@ -12,7 +12,7 @@ use tractive::built_in::traction::BUILT_IN;
 use tractive::cell::Words;
 use tractive::control::{
     AimInput, Boundary, Committed, ControlLaw, Controller, Demand, Gains, Law, LinkDamper, LinkWindow,
-    ModeLimits, PiLaw, Regulated, Ripple, RotorSample, Warmth,
+    ModeLimits, PiLaw, Regulated, RotorSample, Warmth,
 };
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
@@ -126,12 +126,10 @@ impl Walk {
 
     fn committed(&mut self) -> Committed {
         let random = &mut self.random;
-        let ripple = random
-            .is(0.5)
-            .then(|| Ripple { at_horizon_wb: random.vector(0.05), led_wb: random.vector(0.02) });
+        let ripple_wb = random.is(0.5).then(|| random.vector(0.05));
         let volt_seconds = (!random.is(0.02)).then(|| random.vector(0.3));
         let (horizon_s, interval_s) = (random.within(0.0, 1e-3), random.within(1e-4, 1e-3));
-        Committed { horizon_s, volt_seconds, ripple, interval_s }
+        Committed { horizon_s, volt_seconds, ripple_wb, interval_s }
     }
 }
 

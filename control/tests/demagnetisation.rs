@@ -208,7 +208,7 @@ fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
     let committed = tractive_control::control::Committed {
         horizon_s: 0.5e-3,
         volt_seconds,
-        ripple: None,
+        ripple_wb: None,
         interval_s: 0.5e-3,
     };
     let (mut least_a, mut torque_nm) = (0.0_f32, 0.0);

@@ -164,7 +164,7 @@ fn run(machine: &str, flux_scale: f64, sensors: Sensors) -> Outcome {
         let committed = Committed {
             horizon_s: half_s as f32,
             volt_seconds: Some(committed_v * half_s as f32),
-            ripple: None,
+            ripple_wb: None,
             interval_s: half_s as f32,
         };
         let next = identification.regulate(&sample, &committed, &LIMITS, &law).vector;

@@ -8,7 +8,7 @@ use file::{BASIS, hash, holds};
 use std::fmt::Write;
 use tractive_control::frames::Angle;
 use tractive_control::modulation::{
-    CarrierHalf, Ladder, Mode, Modulator, Reference, RippleFlux, Schedule, SwitchLimits, index_limit,
+    CarrierHalf, Ladder, Mode, Modulator, Reference, Schedule, SwitchLimits, index_limit, ripple_at,
     ripple_share,
 };
 use tractive_control::time::{Clock, Instant};
@@ -177,14 +177,8 @@ fn told(mode: Mode, out: &mut String) {
         );
         let voltage_v = index * 1_500.0 * std::f32::consts::FRAC_2_PI;
         let half = step_of(hz) % (2 * mode.carriers()).max(1);
-        if let Some(flux) = RippleFlux::new(mode, voltage_v, 1_500.0, omega.abs()) {
-            let flux = flux.at(half);
-            sum = pin_numbers(sum, &[flux.alpha, flux.beta]);
-        }
-        #[cfg(feature = "optimal")]
-        if let Some(flux) =
-            tractive_control::modulation::optimal_ripple(mode, half, voltage_v, 1_500.0, omega.abs())
-        {
+        if mode.is_pattern() || mode.is_optimal() {
+            let flux = ripple_at(mode, half, voltage_v, 1_500.0, omega.abs());
             sum = pin_numbers(sum, &[flux.alpha, flux.beta]);
         }
     }

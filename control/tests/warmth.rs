@@ -28,7 +28,7 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
         settled: true,
     };
     let volt_seconds = Some(AlphaBeta::default());
-    let committed = Committed { horizon_s: 0.0, volt_seconds, ripple: None, interval_s: 0.5e-3 };
+    let committed = Committed { horizon_s: 0.0, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };
     let turns = rpm / 60.0 * tables.ratings.pole_pairs * 1e-4;
     let (mut law, mut steady_v) = (Controller::new(), 0.0);
     for period in 0..10_000_u16 {

@@ -21,7 +21,7 @@
 //! let (angle, at_rest, none) = (Angle::from_turns(40.0 / 360.0), Angle::ZERO.sin_cos(), Observer::new());
 //! let sample = RotorSample::new(now.unpark(angle.sin_cos()).abc(), angle, &tables);
 //! let volt_seconds = Some(AlphaBeta::default());
-//! let committed = Committed { horizon_s: 0.0, volt_seconds, ripple: None, interval_s: 0.5e-3 };
+//! let committed = Committed { horizon_s: 0.0, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };
 //! let limits = ModeLimits {
 //!     follows: Regulated::Mean,
 //!     # index_limit: 0.9,
@@ -221,8 +221,7 @@ fn held(input: &Input, steady: Dq) -> Dq {
 ///
 /// Voltages that hold for a half move the flux along chords, so at the boundaries it stands outside the circle of its
 /// fundamental by x/sin x. The error e goes to (1 − g) e at the half's end, both in the rotor frame that turns by 2x
-/// meanwhile; all is seen from the frame in the middle of the half. Where a pattern gives way to another, the flux is
-/// led from the ripple of the one to the ripple of the other. With it comes the disturbance in the middle of the half.
+/// meanwhile; all is seen from the frame in the middle of the half. With it comes the disturbance in the middle of the half.
 fn mean_voltage(input: &Input, reference: Dq, gains: &Gains) -> (Dq, Dq) {
     let committed = input.committed;
     let x = 0.5 * input.omega * committed.interval_s;
@@ -233,11 +232,7 @@ fn mean_voltage(input: &Input, reference: Dq, gains: &Gains) -> (Dq, Dq) {
     let chord = reference.j() * (2.0 * x)
         + error * ((remaining - 1.0) * half_turn.cos)
         + error.j() * ((remaining + 1.0) * half_turn.sin);
-    let led = match &committed.ripple {
-        None => chord,
-        Some(ripple) => chord + ripple.led_wb.park(middle),
-    };
-    (led * (1.0 / committed.interval_s), input.disturbance.voltage(middle))
+    (chord * (1.0 / committed.interval_s), input.disturbance.voltage(middle))
 }
 
 /// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon.
@@ -253,9 +248,9 @@ pub fn ahead(
     let flux = match committed.volt_seconds {
         None => sample.flux,
         Some(volt_seconds) => {
-            let moved = match &committed.ripple {
+            let moved = match &committed.ripple_wb {
                 None => volt_seconds,
-                Some(ripple) => volt_seconds - ripple.at_horizon_wb,
+                Some(ripple_wb) => volt_seconds - *ripple_wb,
             };
             let unexplained = disturbance.voltage(on_the_way) - sample.current * resistance;
             // By half the way, and by that once more.

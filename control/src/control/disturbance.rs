@@ -130,7 +130,7 @@ mod tests {
             observer.step(&seen, &Gains::DEFAULT);
             let none = Some(AlphaBeta::default());
             let committed =
-                Committed { horizon_s: 0.0, volt_seconds: none, ripple: None, interval_s: HALF_S };
+                Committed { horizon_s: 0.0, volt_seconds: none, ripple_wb: None, interval_s: HALF_S };
             let limits = ModeLimits {
                 follows: Regulated::Mean,
                 index_limit: 0.9,

@@ -105,21 +105,10 @@ pub struct Committed {
     pub horizon_s: f32,
     /// Volt-seconds until then, in V·s; `None` while the gates are off.
     pub volt_seconds: Option<AlphaBeta>,
-    /// Ripple flux; `None` where there is none at the carrier's boundaries.
-    pub ripple: Option<Ripple>,
+    /// Ripple flux of the pattern at the horizon, in Wb; `None` where there is none.
+    pub ripple_wb: Option<AlphaBeta>,
     /// Expected length of the carrier half that begins there, in s, greater than zero.
     pub interval_s: f32,
-}
-
-/// Ripple flux of a pattern, in Wb.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Ripple {
-    /// At the boundary where the next voltage begins to act.
-    pub at_horizon_wb: AlphaBeta,
-    /// By how much the mean voltage of the half that begins there is to change it: from the ripple that an old pattern leaves to the
-    /// one where the next pattern begins. Where a pattern is running nothing of it is led.
-    pub led_wb: AlphaBeta,
 }
 
 /// A carrier boundary that has passed, and the half that ended there.

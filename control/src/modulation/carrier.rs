@@ -7,10 +7,17 @@ use super::{CarrierHalf, Reference, SwitchLimits};
 use crate::frames::{Abc, AlphaBeta};
 use crate::time::Instant;
 
-/// A half of the asynchronous carrier.
-pub fn asynchronous(half: u32, start: Instant, seen: &Reference, devices: &SwitchLimits) -> CarrierHalf {
+/// A half of the asynchronous carrier, with volt-ticks over the link's voltage besides.
+pub fn asynchronous(
+    half: u32,
+    start: Instant,
+    seen: &Reference,
+    led: AlphaBeta,
+    devices: &SwitchLimits,
+) -> CarrierHalf {
     let period_ticks = devices.shortest_half_ticks;
-    synchronous(half, period_ticks, Zeros::Even, seen.share_within(start, period_ticks), devices)
+    let share = seen.share_within(start, period_ticks) + led * (1.0 / period_ticks as f32);
+    synchronous(half, period_ticks, Zeros::Even, share, devices)
 }
 
 /// The division of a half's zero vectors between its start and its end.

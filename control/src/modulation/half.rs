@@ -49,11 +49,6 @@ impl CarrierHalf {
         (self.mode, self.ahead) == (Mode::Async, [Mode::Async; 2])
     }
 
-    /// `true` for a half of a triangular carrier, free or locked, that two more follow.
-    pub fn is_carried(&self) -> bool {
-        self.mode.is_carrier() && self.ahead == [self.mode; 2]
-    }
-
     /// For how many ticks each phase is at the upper level, from `from` ticks after the start to the end.
     pub fn on_ticks(&self, from: u32) -> [u32; 3] {
         let (mut on, end) = ([0; 3], self.period_ticks);

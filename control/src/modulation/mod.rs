@@ -112,9 +112,8 @@ pub use dead_time::{EdgeDelay, compensate};
 pub use half::CarrierHalf;
 pub use mode::{MODE_CODES, Mode, Regulation};
 pub use modulator::Modulator;
-#[cfg(feature = "optimal")]
-pub use optimal::ripple as optimal_ripple;
 pub use reference::Reference;
-pub use ripple::{RippleFlux, ripple_share};
+use ripple::RippleFlux;
+pub use ripple::{ripple_at, ripple_share};
 pub use schedule::{Ladder, Schedule, first_half, index_floor, index_limit};
 pub use switch_limits::{FREE_CARRIER_SHARE, SwitchLimits};

@@ -5,10 +5,12 @@ use super::flying_start::FlyingStart;
 use super::half::boundary;
 #[cfg(feature = "optimal")]
 use super::optimal::{self, Branch};
-use super::{CarrierHalf, Mode, Reference, Schedule, SwitchLimits, first_half, middle60, schedule};
+use super::{
+    CarrierHalf, Mode, Reference, Schedule, SwitchLimits, first_half, middle60, ripple_at, schedule,
+};
 #[cfg(feature = "optimal")]
-use crate::frames::{AlphaBeta, six_step_v};
-use crate::frames::{Angle, UNITS_PER_RADIAN, limit};
+use crate::frames::six_step_v;
+use crate::frames::{AlphaBeta, Angle, UNITS_PER_RADIAN, limit};
 use crate::time::Instant;
 
 /// The modulator's state.
@@ -25,8 +27,8 @@ pub struct Modulator {
     late_ticks: f32,
     /// Fundamental of the pattern's half before, in V.
     voltage_v: f32,
-    /// `true` if the half before was a pattern's and the next one is a carrier's.
-    after_pattern: bool,
+    /// The pattern that the half before was the last of, and the number that its next one would have had; a carrier follows.
+    left: Option<(Mode, u8)>,
     /// Carriers for which an optimised pattern has waited to take over from a free one.
     #[cfg(feature = "optimal")]
     waited: u32,
@@ -75,7 +77,7 @@ impl Modulator {
             plan: None,
             late_ticks: 0.0,
             voltage_v: 0.0,
-            after_pattern: false,
+            left: None,
             #[cfg(feature = "optimal")]
             waited: 0,
         }
@@ -97,18 +99,19 @@ impl Modulator {
         let pulse = seen.pulse_at(start);
         let from = self.mode;
         self.choose_mode(start, pulse, &seen);
+        let led = self.led(&seen);
         let mut half = if from == Mode::Off && self.mode.is_pattern() {
             self.start_flying(start, pulse, &seen)
         } else if self.mode == Mode::Async {
-            carrier::asynchronous(self.next_half, start, &seen, &self.devices)
+            carrier::asynchronous(self.next_half, start, &seen, led, &self.devices)
         } else {
-            self.locked(start, pulse, &seen)
+            self.locked(start, pulse, &seen, led)
         };
         half.mode = self.mode;
         half.half = self.next_half as u8;
         half.ahead = self.ahead(self.next_half);
         self.next_half = self.half_after(self.next_half, 1);
-        self.after_pattern = false;
+        self.left = None;
         if self.mirrored {
             half.compare_ticks.swap(1, 2);
             half.start_levels.swap(1, 2);
@@ -119,7 +122,8 @@ impl Modulator {
     /// A free half ([`CarrierHalf::is_free`]) that begins at `start`, made anew from a newer reference.
     pub fn revised(&self, half: &CarrierHalf, start: Instant, reference: &Reference) -> CarrierHalf {
         let seen = if self.mirrored { reference.mirrored() } else { *reference };
-        let mut revised = carrier::asynchronous(half.half.into(), start, &seen, &self.devices);
+        let mut revised =
+            carrier::asynchronous(half.half.into(), start, &seen, AlphaBeta::default(), &self.devices);
         (revised.mode, revised.half, revised.ahead) = (half.mode, half.half, half.ahead);
         if self.mirrored {
             revised.compare_ticks.swap(1, 2);
@@ -203,10 +207,10 @@ impl Modulator {
 
     fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
         let from = self.mode;
+        self.left = (!from.is_carrier() && mode.is_carrier()).then_some((from, self.next_half as u8));
         self.next_half = first_half(from, mode, self.next_half, pulse);
         self.mode = mode;
         self.plan = None;
-        self.after_pattern = from.is_pattern() && mode.is_carrier();
         self.schedule.switched(start);
     }
 
@@ -238,7 +242,7 @@ impl Modulator {
     fn zeros(&self) -> Zeros {
         match self.ahead(self.next_half) {
             [next, _] if next.is_pattern() => Zeros::Early,
-            _ if self.after_pattern => Zeros::Late,
+            _ if self.left.is_some_and(|(from, _)| from.is_pattern()) => Zeros::Late,
             _ => Zeros::Even,
         }
     }
@@ -255,7 +259,7 @@ impl Modulator {
     }
 
     /// One half of a carrier that is locked to the pulse angle.
-    fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierHalf {
+    fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference, led: AlphaBeta) -> CarrierHalf {
         let carriers = self.mode.carriers();
         let end = boundary(self.next_half + 1, carriers);
         let ticks_per_unit = 1.0 / seen.rate;
@@ -266,13 +270,13 @@ impl Modulator {
         let wanted = limit(wanted, shortest * nominal, longest * nominal);
         if is_carrier {
             let period_ticks = self.whole_ticks(wanted);
-            let share = seen.share_within(start, period_ticks);
+            let share = seen.share_within(start, period_ticks) + led * (1.0 / period_ticks as f32);
             return carrier::synchronous(self.next_half, period_ticks, self.zeros(), share, &self.devices);
         }
         #[cfg(feature = "optimal")]
         if let Some(branch) = self.mode.branch() {
             let period_ticks = self.whole_ticks(wanted);
-            return self.optimal(branch, start, period_ticks, seen);
+            return self.optimal(branch, start, period_ticks, (seen, led));
         }
         let own_rad = middle60::zero_rad(self.mode, seen.voltage_v, seen.udc_v);
         let late_ticks = core::mem::take(&mut self.late_ticks);
@@ -294,6 +298,24 @@ impl Modulator {
         middle60::half(self.mode, self.next_half, period_ticks, notched.then_some(notch), &self.devices)
     }
 
+    /// The volt-ticks, over the link's voltage, by which the next half leads the flux from where an old pattern has left it, and to where a pattern
+    /// that follows begins; a carrier's flux is the fundamental itself at its boundaries, and a pattern of middle 60° leads nothing.
+    #[inline(always)]
+    fn led(&self, seen: &Reference) -> AlphaBeta {
+        let next = self.gives_way_to();
+        if next.is_none() && self.left.is_none() || self.mode.is_pattern() {
+            return AlphaBeta::default();
+        }
+        let per_tick = seen.rate * (1.0 / UNITS_PER_RADIAN);
+        let at = |mode: Mode, half: u32| ripple_at(mode, half, seen.voltage_v, seen.udc_v, per_tick);
+        let end = self.half_after(self.next_half, 1);
+        let begins = next.map_or(AlphaBeta::default(), |to| {
+            at(to, first_half(self.mode, to, self.next_half + 1, Angle::ZERO))
+        });
+        let (mode, half) = self.left.unwrap_or((self.mode, end as u8));
+        (begins - at(mode, half.into())) * (1.0 / seen.udc_v)
+    }
+
     /// The mode that takes over after the next half, if one does.
     fn gives_way_to(&self) -> Option<Mode> {
         Some(self.plan.filter(|plan| plan.at == self.half_after(self.next_half, 1))?.to)
@@ -302,13 +324,19 @@ impl Modulator {
     /// One half of an optimised pattern, its edges moved by what the wanted mean voltage differs from the pattern's fundamental.
     #[cfg(feature = "optimal")]
     #[inline(never)]
-    fn optimal(&self, branch: &Branch, start: Instant, period_ticks: u32, seen: &Reference) -> CarrierHalf {
+    fn optimal(
+        &self,
+        branch: &Branch,
+        start: Instant,
+        period_ticks: u32,
+        (seen, led): (&Reference, AlphaBeta),
+    ) -> CarrierHalf {
         let carriers = self.mode.carriers();
         let middle = boundary(self.next_half, carriers) + Angle(boundary(1, carriers).0 / 2);
         let round = (middle - Angle::DEG_90).sin_cos();
         let index = branch.within(seen.voltage_v / six_step_v(seen.udc_v));
         let own = AlphaBeta { alpha: round.cos, beta: round.sin } * (index * core::f32::consts::FRAC_2_PI);
-        let more_ticks = (seen.share_within(start, period_ticks) - own) * period_ticks as f32;
+        let more_ticks = (seen.share_within(start, period_ticks) - own) * period_ticks as f32 + led;
         let (half, wanted) = (self.next_half, (index, more_ticks));
         match self.gives_way_to().and_then(|next| next.branch()) {
             Some(next) => optimal::last_half((branch, next), half, period_ticks, wanted, &self.devices),

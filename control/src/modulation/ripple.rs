@@ -93,6 +93,17 @@ const fn directions<const N: usize>(count: u32) -> [SinCos; N] {
     directions
 }
 
+/// The ripple flux of any mode where half number `half` begins, in Wb, in the stationary frame of the (mirrored) turn, as of [`RippleFlux::new`]: nothing under a
+/// carrier.
+#[inline(never)]
+pub fn ripple_at(mode: Mode, half: u32, voltage_v: f32, udc_v: f32, omega: f32) -> AlphaBeta {
+    #[cfg(feature = "optimal")]
+    if let Some(ripple) = super::optimal::ripple(mode, half, voltage_v, udc_v, omega) {
+        return ripple;
+    }
+    RippleFlux::new(mode, voltage_v, udc_v, omega).map_or(AlphaBeta::default(), |flux| flux.at(half))
+}
+
 /// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `modulation_index` of
 /// six-step: within a tenth of what the pulses have, but for three pulses, which count by their torque. The carriers count as one, that of 12
 /// carriers a turn.

@@ -164,7 +164,7 @@ impl<L: ControlLaw> Axis<L> {
             horizon_s: period_s,
             volt_seconds: begins.map(|mean| mean * (input.link_v * period_s)),
             // A period is its own mirror image, so at its ends the ripple is nothing.
-            ripple: None,
+            ripple_wb: None,
             interval_s: period_s,
         };
         let limits = ModeLimits {

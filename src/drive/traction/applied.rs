@@ -1,16 +1,12 @@
 //! The modulator's work, as the control law is told of it.
 
 use super::Settings;
-use super::pulses::{Half, Pulses};
+use super::pulses::{Half, MOST_PLANNED, Pulses};
 use super::six_step_exit::SixStepExit;
 use super::slot::Decision;
-use crate::control::{Boundary, Committed, ModeLimits, Regulated, Ripple};
+use crate::control::{Boundary, Committed, ModeLimits, Regulated};
 use crate::frames::{AlphaBeta, Angle};
-#[cfg(feature = "optimal")]
-use crate::modulation::optimal_ripple;
-use crate::modulation::{
-    Mode, Reference, Regulation, RippleFlux, first_half, index_floor, index_limit, ripple_share,
-};
+use crate::modulation::{Mode, Regulation, first_half, index_floor, index_limit, ripple_at, ripple_share};
 use crate::time::{Clock, Instant};
 
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
@@ -26,8 +22,8 @@ pub(super) struct Steady {
     pub voltage_v: f32,
 }
 
-/// The volt-seconds of the halves that ended at the newest boundary, and their time, on a link of this voltage and of currents that are so many ticks late. The last half counts where its beginning was the boundary
-/// that was `used` last, and two of them where that was the one before.
+/// The volt-seconds of the halves that ended since the boundary that was `used` last, until the newest one, and their time, on a link of this voltage and of
+/// currents that are so many ticks late.
 #[inline(always)]
 pub(super) fn passed(
     pulses: &Pulses,
@@ -35,19 +31,29 @@ pub(super) fn passed(
     (udc_v, late): (f32, u32),
     clock: &Clock,
 ) -> Boundary {
-    let [newest, one, two, three] = [0, 1, 2, 3].map(|boundaries| pulses.before(boundaries));
-    let both = used == Some(two.at);
-    let before = if both { two.at } else { one.at };
-    let known = used == Some(before) && !two.is_off() && !(both && three.is_off());
-    let whole = || if both { two.volt_ticks + three.volt_ticks } else { two.volt_ticks };
-    // Seen so late: since as long before the beginning, and until as long before the end.
-    let earlier = || if both { pulses.before(4) } else { three };
-    let shifted = || whole() + earlier().last_volt_ticks(late) - two.last_volt_ticks(late);
-    let volt_ticks = || if late == 0 { whole() } else { shifted() };
-    Boundary {
-        volt_seconds: known.then(|| volt_ticks() * (udc_v * clock.tick_s)),
-        length_s: clock.seconds(newest.at.since(before)),
+    let newest = pulses.before(0).at;
+    let unknown =
+        || Boundary { volt_seconds: None, length_s: clock.seconds(newest.since(pulses.before(1).at)) };
+    let Some(used) = used else { return unknown() };
+    let mut volt_ticks = AlphaBeta::default();
+    for boundaries in 1..=MOST_PLANNED {
+        let ended = pulses.before(boundaries + 1);
+        if ended.is_off() {
+            break;
+        }
+        volt_ticks = volt_ticks + ended.volt_ticks;
+        if pulses.before(boundaries).at == used {
+            if late != 0 {
+                // Seen so late: since as long before the beginning, and until as long before the end.
+                let [earlier, last] =
+                    [boundaries + 2, 2].map(|half| pulses.before(half).last_volt_ticks(late));
+                volt_ticks = volt_ticks + earlier - last;
+            }
+            let volt_seconds = Some(volt_ticks * (udc_v * clock.tick_s));
+            return Boundary { volt_seconds, length_s: clock.seconds(newest.since(used)) };
+        }
     }
+    unknown()
 }
 
 /// The quantities that control may regulate in a mode.
@@ -125,15 +131,11 @@ impl Ahead {
 }
 
 /// The half that a command is made for.
-pub(super) struct Wanted<'a> {
+pub(super) struct Wanted {
     /// Mode of the half where it begins to act.
     pub mode: Mode,
     /// `true` if it is for the half that is already committed: only the running one stands.
     pub revises: bool,
-    /// Halves between the committed one and that half, as in [`Slot::between`](super::slot::Slot::between), and the command that they
-    /// are made from.
-    pub between: u32,
-    pub before: &'a Reference,
     /// Mean link voltage until then, in V.
     pub udc_v: f32,
 }
@@ -160,71 +162,50 @@ pub(super) fn committed(
     settings: &Settings,
     wanted: &Wanted,
 ) -> Committed {
-    let Wanted { mode: decided, revises, between, before: command, udc_v } = *wanted;
+    let Wanted { mode: decided, revises, udc_v } = *wanted;
     let clock = &settings.clock;
     let interval_s = interval_s(decided, steady.omega, settings);
-    let Some(newest) = pulses.newest() else {
-        return Committed { horizon_s: 0.0, volt_seconds: None, ripple: None, interval_s };
+    let (Some(newest), Some(last)) = (pulses.newest(), pulses.last()) else {
+        return Committed { horizon_s: 0.0, volt_seconds: None, ripple_wb: None, interval_s };
     };
     let running = pulses.before(1);
     let elapsed = now.since(newest.at).max(0) as u32;
-    let period_ticks = newest.half.period_ticks;
     // Of currents from before the newest boundary.
     let before = newest.at.since(now).max(0) as u32;
     let rest = || {
         let rest = running.volt_ticks_from(elapsed);
         if before == 0 { rest } else { rest + pulses.before(2).last_volt_ticks(before) }
     };
-    let volt_ticks = (!newest.is_off() && !running.is_off())
-        .then(|| if revises { rest() } else { rest() + newest.volt_ticks });
-    let left = newest.begins.since(now).max(0) as u32 + if revises { 0 } else { period_ticks };
-    let volt_seconds = volt_ticks.map(|ticks| ticks * (udc_v * clock.tick_s));
-    let gap = between * period_ticks;
-    let made = || command.vector_at(now.after(left + gap / 2)) * clock.seconds(gap as i32);
+    let until = if revises { newest.begins } else { last.ends() };
+    let volt_ticks = if newest.is_off() || running.is_off() {
+        None
+    } else if revises {
+        Some(rest())
+    } else {
+        pulses.unloaded_volt_ticks().map(|planned| rest() + newest.volt_ticks + planned)
+    };
     Committed {
-        horizon_s: clock.seconds((left + gap) as i32),
-        volt_seconds: if gap == 0 { volt_seconds } else { volt_seconds.map(|known| known + made()) },
-        ripple: newest.ripple(decided, steady),
+        horizon_s: clock.seconds(until.since(now).max(0)),
+        volt_seconds: volt_ticks.map(|ticks| ticks * (udc_v * clock.tick_s)),
+        ripple_wb: last.ripple_wb(decided, steady),
         interval_s,
     }
 }
 
 impl Half {
-    /// Ripple flux at the end of this half, which is committed, and what the half after it, of the mode `decided`, is to change of it.
-    /// Where a pattern begins at the first of these, its own ripple is expected; where a carrier begins, what the old pattern leaves.
-    fn ripple(&self, decided: Mode, steady: &Steady) -> Option<Ripple> {
+    /// Ripple flux at the end of this half, which is committed, where one of the mode `decided` begins: what an old pattern leaves to a carrier, and that of a
+    /// pattern that begins there.
+    fn ripple_wb(&self, decided: Mode, steady: &Steady) -> Option<AlphaBeta> {
         let (mode, end) = (self.half.mode, u32::from(self.half.half) + 1);
-        let [_, after] = self.half.ahead;
-        if decided.is_pattern() {
-            let at_horizon_wb = self.ripple_at(decided, number(mode, decided, end), steady);
-            return Some(Ripple { at_horizon_wb, led_wb: AlphaBeta::default() });
+        if has_path(decided) {
+            return Some(self.ripple_at(decided, number(mode, decided, end), steady));
         }
-        if decided.is_optimal() {
-            // The pattern itself leads the flux along its own path, and what moves its edges to that of the next one.
-            let half = number(mode, decided, end);
-            let at_horizon_wb = self.ripple_at(decided, half, steady);
-            let change = || {
-                let own = self.ripple_at(decided, half + 1, steady);
-                self.ripple_at(after, number(decided, after, half + 1), steady) - own
-            };
-            let led_wb = if after == decided { AlphaBeta::default() } else { change() };
-            return Some(Ripple { at_horizon_wb, led_wb });
-        }
-        if !has_path(mode) && !has_path(after) {
-            return None;
-        }
-        let at_horizon_wb = self.ripple_at(mode, end, steady);
-        let after_wb = self.ripple_at(after, number(decided, after, number(mode, decided, end) + 1), steady);
-        Some(Ripple { at_horizon_wb, led_wb: after_wb - at_horizon_wb })
+        has_path(mode).then(|| self.ripple_at(mode, end, steady))
     }
 
     /// A mode's ripple where half number `half` begins, seen in the mirror if the half is: nothing under a carrier.
     fn ripple_at(&self, mode: Mode, half: u32, steady: &Steady) -> AlphaBeta {
-        let omega = steady.omega.abs();
-        let flux = RippleFlux::new(mode, steady.voltage_v, steady.udc_v, omega);
-        let ripple = flux.map_or(AlphaBeta::default(), |flux| flux.at(half));
-        #[cfg(feature = "optimal")]
-        let ripple = optimal_ripple(mode, half, steady.voltage_v, steady.udc_v, omega).unwrap_or(ripple);
+        let ripple = ripple_at(mode, half, steady.voltage_v, steady.udc_v, steady.omega.abs());
         AlphaBeta { beta: if self.mirrored { -ripple.beta } else { ripple.beta }, ..ripple }
     }
 }

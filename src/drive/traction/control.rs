@@ -257,7 +257,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let Seen { now, ref measured, omega, .. } = *seen;
         let pulsing =
             self.trip.is_none() && command.enable && self.controller.speed_is_known() && !self.exit.crosses();
-        let slot = Slot::of(self.pulses.newest(), now, &self.settings.clock);
+        let slot = Slot::of(&self.pulses, now, &self.settings.clock);
         let pulsing = if pulsing {
             let ratings = &self.machine.tables().ratings;
             let angle = sample.angle.unwrap_or(Angle::ZERO);

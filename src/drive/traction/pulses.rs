@@ -16,13 +16,14 @@ const LATEST: u32 = 3;
 
 /// Halves that a control period may plan: a locked carrier of a machine that switches once a control period has five, and one more if it is
 /// turned on; of the optimised patterns' short halves eleven.
-const MOST_PLANNED: u32 = if cfg!(feature = "optimal") { 12 } else { 6 };
+pub(super) const MOST_PLANNED: u32 = if cfg!(feature = "optimal") { 12 } else { 6 };
 
 /// Halves that the cell to the PWM interrupt holds: those for a period's boundaries, and those that are planned meanwhile for the next one's.
 pub const PLANNED_SLOTS: usize = if cfg!(feature = "optimal") { 32 } else { 16 };
 
-/// Halves that are remembered: four that ended or run, and those that are planned for two periods.
+/// Halves that are remembered: those of a period that ended, three that run or are loaded, and those that are planned ahead.
 const REMEMBERED: usize = PLANNED_SLOTS;
+const _: () = assert!(2 * MOST_PLANNED as usize + 3 <= REMEMBERED);
 
 /// The halves that control has planned, for the PWM interrupt.
 pub type Planned = Mailbox<PlannedHalf, PLANNED_WORDS, PLANNED_SLOTS>;
@@ -90,7 +91,7 @@ impl Half {
     }
 
     #[inline]
-    fn ends(&self) -> Instant {
+    pub fn ends(&self) -> Instant {
         self.begins.after(self.half.period_ticks)
     }
 }
@@ -155,6 +156,32 @@ impl Pulses {
     #[inline(always)]
     pub(super) fn newest(&self) -> Option<&Half> {
         self.told.map(|_| self.half(self.loaded))
+    }
+
+    /// The half that was planned last: nothing is planned for the boundary where it begins; `None` before there was a boundary.
+    #[inline(always)]
+    pub(super) fn last(&self) -> Option<&Half> {
+        self.told.map(|_| self.half(self.planned))
+    }
+
+    /// Halves that are planned and not loaded yet.
+    #[inline(always)]
+    pub(super) fn unloaded(&self) -> u32 {
+        self.planned.wrapping_sub(self.loaded)
+    }
+
+    /// Their volt-ticks, in ticks; `None` where the gates are off in one of them.
+    #[inline(always)]
+    pub(super) fn unloaded_volt_ticks(&self) -> Option<AlphaBeta> {
+        let mut sum = AlphaBeta::default();
+        for ahead in 1..=self.unloaded().min(MOST_PLANNED) {
+            let half = self.half(self.loaded.wrapping_add(ahead));
+            if half.is_off() {
+                return None;
+            }
+            sum = sum + half.volt_ticks;
+        }
+        Some(sum)
     }
 
     /// The half that was loaded so many boundaries before the newest one.

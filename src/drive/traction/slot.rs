@@ -1,11 +1,8 @@
 //! The boundary that uses the command of a control period, and so the purpose of the period.
 
-use super::pulses::Half;
+use super::pulses::Pulses;
 use crate::modulation::Mode;
 use crate::time::{Clock, Instant};
-
-/// Halves between, where a carrier lasts a control period.
-const MOST_BETWEEN: u32 = 2;
 
 /// Control periods within which an operating point serves another boundary: halves shorter than that make one for every second of them, as often as the
 /// free carrier's do.
@@ -22,10 +19,10 @@ pub(super) struct Decision {
 
 impl Decision {
     /// `true` if an operating point for one serves the other, too: that of the same boundary and mode, and that of one before which is less than
-    /// [`SERVES_PERIODS`] away.
-    pub fn serves(&self, other: &Self, clock: &Clock) -> bool {
+    /// [`SERVES_PERIODS`] away, or however far it is where nothing newer could be made.
+    pub fn serves(&self, other: &Self, clock: &Clock, nothing_newer: bool) -> bool {
         let away = other.boundary.since(self.boundary) as u32;
-        self.mode == other.mode && away < SERVES_PERIODS * clock.control_ticks
+        self.mode == other.mode && (nothing_newer || away < SERVES_PERIODS * clock.control_ticks)
     }
 }
 
@@ -40,46 +37,28 @@ pub(super) struct Slot {
     pub commands: bool,
     /// `true` if it uses that of the next one.
     pub aims: bool,
-    /// Halves of a triangular carrier between the one that is committed already and the first of this command: those of the command before.
-    pub between: u32,
+    /// `true` if halves last less than two periods, so that no period is left between the operating point and the command: not for the sake of a single
+    /// half, as where a pattern catches up with its angle.
+    pub folds: bool,
 }
 
 impl Slot {
     /// The period that begins at `now`. While nothing is known of the modulator each one may be the last.
-    #[inline]
-    pub(super) fn of(newest: Option<&Half>, now: Instant, clock: &Clock) -> Self {
-        let Some(newest) = newest else {
+    #[inline(always)]
+    pub(super) fn of(pulses: &Pulses, now: Instant, clock: &Clock) -> Self {
+        let Some(last) = pulses.last() else {
             let key = Decision { boundary: now, mode: Mode::Off, after: Mode::Off };
-            return Self { now, key, commands: true, aims: false, between: 0 };
+            return Self { now, key, commands: true, aims: false, folds: false };
         };
-        let period = clock.control_ticks;
-        let valid = now.after(period);
-        let later = |halves| newest.begins.after(halves * newest.half.period_ticks);
-        let [next, next_but_one] = newest.half.ahead;
-        let rest = later(0).since(valid);
-        if rest >= 2 * period as i32 {
-            // Most periods of a long half.
-            let key = Decision { boundary: newest.begins, mode: next, after: next_but_one };
-            return Self { now, key, commands: false, aims: false, between: 0 };
-        }
-        let halves = if rest >= 0 {
-            0
-        } else if later(1).reached(valid) {
-            1
-        } else {
-            MOST_BETWEEN
-        };
-        let left = later(halves).since(valid);
-        let commands = left < period as i32;
-        // A pattern's half of less than two periods, which is rare, counts as if this command were in time for the next boundary.
-        let between = if commands && !newest.half.is_carried() { 0 } else { halves };
-        let mode = if between == 0 { next } else { next_but_one };
+        let [mode, after] = last.half.ahead;
+        let left = last.begins.since(now) - clock.control_ticks as i32;
+        let commands = left < clock.control_ticks as i32;
         Self {
             now,
-            key: Decision { boundary: later(between), mode, after: next_but_one },
+            key: Decision { boundary: last.begins, mode, after },
             commands,
-            aims: !commands && left < 2 * period as i32,
-            between,
+            aims: !commands && left < 2 * clock.control_ticks as i32,
+            folds: pulses.unloaded() > 0 && last.half.period_ticks < 2 * clock.control_ticks,
         }
     }
 }
@@ -100,8 +79,12 @@ mod tests {
             {
                 let aimed = at(first, Mode::Mid7);
                 let later = at(first.wrapping_add(away), Mode::Mid7);
-                assert_eq!(aimed.serves(&later, &clock), serves, "{first} {away}");
-                assert!(!aimed.serves(&Decision { mode: Mode::Mid3, ..later }, &clock), "{first} {away}");
+                assert_eq!(aimed.serves(&later, &clock, false), serves, "{first} {away}");
+                assert!(aimed.serves(&later, &clock, true), "{first} {away}");
+                for nothing_newer in [false, true] {
+                    let another = Decision { mode: Mode::Mid3, ..later };
+                    assert!(!aimed.serves(&another, &clock, nothing_newer), "{first} {away}");
+                }
             }
         }
     }

@@ -30,7 +30,7 @@
 //!     // …
 //! };
 //! let volt_seconds = Some(AlphaBeta::default());
-//! let committed = Committed { horizon_s: 0.5e-3, volt_seconds, ripple: None, interval_s: 0.5e-3 };
+//! let committed = Committed { horizon_s: 0.5e-3, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };
 //! let mut pi = PiLaw::new();
 //! let sample = RotorSample::new(mtpa(600.0, &tables).unpark(Angle::ZERO.sin_cos()).abc(), Angle::ZERO, &tables);
 //! for _ in 0..20 {

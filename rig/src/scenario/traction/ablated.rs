@@ -116,7 +116,7 @@ impl ControlLaw for Ablated {
         let now = committed.volt_seconds.map(|_| AlphaBeta::default());
         let committed = match self.part {
             Part::Prediction => Committed { horizon_s: 0.0, volt_seconds: now, ..*committed },
-            Part::Ripple => Committed { ripple: None, ..*committed },
+            Part::Ripple => Committed { ripple_wb: None, ..*committed },
             _ => *committed,
         };
         self.controller.regulate(sample, &committed, limits, law)

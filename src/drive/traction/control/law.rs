@@ -33,23 +33,24 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.revises = self.is_to_revise(slot.now, &input.command.demand);
         let commands = slot.commands || self.revises;
         let is_own = |aimed: &Decision| aimed.boundary == slot.key.boundary;
-        let serves = |aimed: &Decision| aimed.serves(&slot.key, &self.settings.clock);
+        // After a single short half no period was left for a point.
+        let is_short = commands && !slot.folds;
+        let serves = |aimed: &Decision| aimed.serves(&slot.key, &self.settings.clock, is_short);
         let served = || self.aimed.filter(|aimed| serves(aimed) && (L::POINT_SERVES || is_own(aimed)));
         // A pattern's last half has a point of its own, and so has a boundary whose point was made early, after a jump.
         let is_old = |aimed: &Decision| is_own(aimed) || aimed.after != slot.key.after;
         let aims = (slot.aims || commands) && served().is_none_or(|aimed| slot.aims && is_old(&aimed));
-        let slices_fold = slot.between > 0;
         // Not in the longest periods, either.
-        if !aims || slices_fold {
+        if !aims || slot.folds {
             self.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
             self.delay = self.delayed();
         }
-        if slot.aims || (slot.commands && slices_fold) {
+        if slot.aims || (slot.commands && slot.folds) {
             self.look_ahead(input.sample.udc_v, slot);
         }
         // Once a half, and not in the longest periods unless all are.
-        if slot.commands && (!aims || slices_fold) {
+        if slot.commands && (!aims || slot.folds) {
             self.learn_angle(measured.angle, here.frame);
         }
         if let Some(at) = self.pulses.newest().map(|newest| newest.at)
@@ -73,10 +74,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let clock = &self.settings.clock;
         self.ripple.step(udc_v, clock.seconds(slot.now.since(self.link_seen)));
         self.link_seen = slot.now;
-        if let Some(newest) = self.pulses.newest() {
+        if let Some(last) = self.pulses.last() {
             let first_s = if slot.commands { 0.0 } else { clock.control_s };
-            let begins = slot.key.boundary.after(newest.half.period_ticks);
-            let horizon_s = clock.seconds(begins.since(slot.now));
+            let horizon_s = clock.seconds(last.ends().since(slot.now));
             let interval_s = interval_s(slot.key.mode, self.controller.omega(), &self.settings);
             let middles_s = [0.5 * (first_s + horizon_s), horizon_s + 0.5 * interval_s];
             let [committed_v, next_v] = self.ripple.change(first_s, middles_s);
@@ -170,8 +170,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v };
         let (mode, revises) = (slot.key.mode, self.revises);
         let committed_v = (sample.udc_v + committed_v) * self.link_scale;
-        let wanted =
-            Wanted { mode, revises, between: slot.between, before: &self.reference, udc_v: committed_v };
+        let wanted = Wanted { mode, revises, udc_v: committed_v };
         let committed = committed(&self.pulses, now, &steady, &self.settings, &wanted);
         let law = Law { gains, clock, tables: self.machine.tables() };
         let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
