@@ -65,7 +65,49 @@ impl Slot {
 
 #[cfg(all(test, not(loom)))]
 mod tests {
+    use super::super::Settings;
+    use super::super::pulses::{Order, Planned};
     use super::*;
+    use crate::cell::History;
+    use crate::drive::messages::Loaded;
+    use crate::frames::{Abc, Angle};
+    use crate::modulation::{Reference, Schedule, SwitchLimits};
+
+    /// Periods of two hundred that have both, with a free carrier of such halves.
+    fn folded(half_ticks: u32) -> usize {
+        let clock = Clock::new(25_000_000, 2_500);
+        let devices =
+            SwitchLimits { shortest_half_ticks: half_ticks, ..SwitchLimits::new(250, 0, 900.0, &clock) };
+        let schedule = Schedule::fixed(Mode::Async, &clock);
+        let mut pulses = Pulses::new(&Settings::new(clock, devices), schedule);
+        let (history, planned) = (History::new(), Planned::new());
+        let mut at = Instant(half_ticks + 1_250);
+        let periods = (1..=200).filter(|period| {
+            let now = Instant(period * 2_500);
+            while now.reached(at) {
+                let begins = at.after(half_ticks);
+                let loaded = Loaded { at, begins, currents_a: Abc::default(), tripped: false, released: 0 };
+                history.publish(loaded.to_words());
+                at = begins;
+            }
+            pulses.look(&history, now, now.after(2_500));
+            let slot = Slot::of(&pulses, now, &clock);
+            let reference = Reference::turning(100.0, Angle::ZERO, 1_000.0, now, 1_500.0);
+            let until = now.after(2 * 2_500);
+            if pulses.lack(until) {
+                pulses.plan(until, &Order { pulses: true, reference: &reference, release: 0 }, &planned);
+            }
+            slot.folds
+        });
+        periods.count()
+    }
+
+    /// From two periods on there is one for each.
+    #[test]
+    fn slices_fold_where_a_half_is_shorter_than_two_periods() {
+        assert!(folded(4_999) > 80 && folded(2_000) > 150);
+        assert_eq!([5_000, 5_001, 13_889].map(folded), [0; 3]);
+    }
 
     /// An operating point serves its own boundary and those of the same mode that come less than three periods after it, also where instants wrap; none that
     /// came before.
