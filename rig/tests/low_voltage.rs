@@ -75,12 +75,19 @@ fn patterns_faster_than_control_keep_their_current() {
 }
 
 /// Of a machine whose locked carriers have halves of half a control period a command acts for two of them. Taken for one, it took away twice its error, and the
-/// machine tripped at 5,332 r/min.
+/// machine tripped at 5,332 r/min. Trimmed by so few samples of its torque it was 1.9 % off after a catch.
 #[test]
 fn a_locked_carrier_as_fast_as_control_keeps_its_current() {
     keeps_its_bounds(
         "--pole-pairs 5 --rs 0.0125 --ld 180e-6 --lq 180e-6 --psi-f 0.0834 --max-current 258 --udc 560 --max-speed-rpm 6000 --max-switching-hz 10000",
-        &[("sweep", 4), ("load-steps", 4), ("full-step", 4), ("reversal", 2), ("link-steps", 1)],
+        &[
+            ("sweep", 4),
+            ("load-steps", 4),
+            ("full-step", 4),
+            ("reversal", 2),
+            ("link-steps", 1),
+            ("restart", 3),
+        ],
     );
 }
 

@@ -93,8 +93,8 @@ const fn directions<const N: usize>(count: u32) -> [SinCos; N] {
     directions
 }
 
-/// The ripple flux of any mode where half number `half` begins, in Wb, in the stationary frame of the (mirrored) turn, as of [`RippleFlux::new`]: nothing under a
-/// carrier.
+/// The ripple flux of any mode where half number `half` begins, in Wb, in the stationary frame of the (mirrored) turn, for a fundamental of
+/// `voltage_v` (peak phase) at a stator frequency of `omega` (rad/s, greater than zero): nothing under a carrier.
 #[inline(never)]
 pub fn ripple_at(mode: Mode, half: u32, voltage_v: f32, udc_v: f32, omega: f32) -> AlphaBeta {
     #[cfg(feature = "optimal")]

@@ -110,10 +110,10 @@ pub(super) fn limits(
 /// wanders through it slowly.
 const FEW_SAMPLES: u32 = 11;
 
-/// `true` for a free carrier so fast that the samples' mean torque may not be the carrier's.
+/// `true` for a triangular carrier so fast that the samples' mean torque may not be the carrier's.
 const fn aliases(mode: Mode, settings: &Settings) -> bool {
     let Settings { devices, clock, .. } = settings;
-    matches!(mode, Mode::Async) && 2 * devices.shortest_half_ticks < FEW_SAMPLES * clock.control_ticks
+    mode.is_carrier() && 2 * devices.shortest_half_ticks < FEW_SAMPLES * clock.control_ticks
 }
 
 /// The change of the link that is expected after the sample of a command, in V.
@@ -227,7 +227,7 @@ mod tests {
     use crate::time::Clock;
 
     #[test]
-    fn a_free_carrier_of_fewer_than_eleven_samples_aliases() {
+    fn a_carrier_of_fewer_than_eleven_samples_aliases() {
         let clock = Clock::new(25_000_000, 2_500);
         let of = |mode: Mode, switching_hz: f32| {
             aliases(mode, &Settings::new(clock, SwitchLimits::new(250, 0, switching_hz, &clock)))
@@ -235,7 +235,8 @@ mod tests {
         for (switching_hz, does) in [(900.0, false), (909.0, false), (910.0, true), (10_000.0, true)] {
             assert_eq!(of(Mode::Async, switching_hz), does, "{switching_hz} Hz");
         }
-        assert!(!of(Mode::Sync15, 10_000.0), "its ripple is known");
+        assert!(of(Mode::Sync15, 10_000.0) && !of(Mode::Sync15, 900.0));
+        assert!(!of(Mode::Mid7, 10_000.0), "its ripple is known");
         let limits = SwitchLimits::new(250, 0, 900.0, &clock);
         let half = |shortest_half_ticks| Settings::new(clock, SwitchLimits { shortest_half_ticks, ..limits });
         assert!(

@@ -55,7 +55,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
         if let Some(at) = self.pulses.newest().map(|newest| newest.at)
             && self.boundary != Some(at)
-            && (aims || !commands)
+            && (aims || !commands || slot.folds)
         {
             self.learn(input.sample, measured.angle, slot, shared);
             self.boundary = Some(at);
