@@ -1,12 +1,15 @@
 //! The boundary that uses the command of a control period, and so the purpose of the period.
 
-use super::pulses::Pulses;
+use super::pulses::{Half, Pulses};
 use crate::modulation::Mode;
 use crate::time::{Clock, Instant};
 
 /// Control periods within which an operating point serves another boundary: halves shorter than that make one for every second of them, as often as the
 /// free carrier's do.
 const SERVES_PERIODS: u32 = 3;
+
+/// The same after a single half of less than two periods, which leaves none for a point: as much more as such a half.
+const LATE_SERVES_PERIODS: u32 = SERVES_PERIODS + 2;
 
 /// The decision of a boundary: the mode of the half that begins at the one after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,10 +22,11 @@ pub(super) struct Decision {
 
 impl Decision {
     /// `true` if an operating point for one serves the other, too: that of the same boundary and mode, and that of one before which is less than
-    /// [`SERVES_PERIODS`] away, or however far it is where nothing newer could be made.
+    /// [`SERVES_PERIODS`] away, or [`LATE_SERVES_PERIODS`] where nothing newer could be made.
     pub fn serves(&self, other: &Self, clock: &Clock, nothing_newer: bool) -> bool {
         let away = other.boundary.since(self.boundary) as u32;
-        self.mode == other.mode && (nothing_newer || away < SERVES_PERIODS * clock.control_ticks)
+        let periods = if nothing_newer { LATE_SERVES_PERIODS } else { SERVES_PERIODS };
+        self.mode == other.mode && away < periods * clock.control_ticks
     }
 }
 
@@ -53,12 +57,13 @@ impl Slot {
         let [mode, after] = last.half.ahead;
         let left = last.begins.since(now) - clock.control_ticks as i32;
         let commands = left < clock.control_ticks as i32;
+        let is_short = |half: &Half| half.half.period_ticks < 2 * clock.control_ticks;
         Self {
             now,
             key: Decision { boundary: last.begins, mode, after },
             commands,
             aims: !commands && left < 2 * clock.control_ticks as i32,
-            folds: pulses.unloaded() > 0 && last.half.period_ticks < 2 * clock.control_ticks,
+            folds: is_short(last) && (pulses.unloaded() > 0 || is_short(pulses.before(1))),
         }
     }
 }
@@ -73,15 +78,15 @@ mod tests {
     use crate::frames::{Abc, Angle};
     use crate::modulation::{Reference, Schedule, SwitchLimits};
 
-    /// Periods of two hundred that have both, with a free carrier of such halves.
-    fn folded(half_ticks: u32) -> usize {
+    /// Periods of two hundred that have both, with a free carrier of such halves, so long after a control period.
+    fn folded(half_ticks: u32, phase_ticks: u32) -> usize {
         let clock = Clock::new(25_000_000, 2_500);
         let devices =
             SwitchLimits { shortest_half_ticks: half_ticks, ..SwitchLimits::new(250, 0, 900.0, &clock) };
         let schedule = Schedule::fixed(Mode::Async, &clock);
         let mut pulses = Pulses::new(&Settings::new(clock, devices), schedule);
         let (history, planned) = (History::new(), Planned::new());
-        let mut at = Instant(half_ticks + 1_250);
+        let mut at = Instant(half_ticks + phase_ticks);
         let periods = (1..=200).filter(|period| {
             let now = Instant(period * 2_500);
             while now.reached(at) {
@@ -105,8 +110,10 @@ mod tests {
     /// From two periods on there is one for each.
     #[test]
     fn slices_fold_where_a_half_is_shorter_than_two_periods() {
-        assert!(folded(4_999) > 80 && folded(2_000) > 150);
-        assert_eq!([5_000, 5_001, 13_889].map(folded), [0; 3]);
+        assert!(folded(4_999, 1_250) > 80 && folded(2_000, 1_250) > 150);
+        assert_eq!([5_000, 5_001, 13_889].map(|half_ticks| folded(half_ticks, 1_250)), [0; 3]);
+        // Where boundaries come with control's own periods every half that is planned is loaded.
+        assert!(folded(2_500, 0) > 150, "{}", folded(2_500, 0));
     }
 
     /// An operating point serves its own boundary and those of the same mode that come less than three periods after it, also where instants wrap; none that
@@ -116,13 +123,18 @@ mod tests {
         let clock = Clock::new(25_000_000, 2_500);
         let at = |instant: u32, mode| Decision { boundary: Instant(instant), mode, after: Mode::Mid3 };
         for first in [0, 1_000_000, u32::MAX - 3_000] {
-            for (away, serves) in
-                [(0, true), (7_499, true), (7_500, false), (1 << 31, false), (u32::MAX, false)]
-            {
+            for (away, serves) in [
+                (0, true),
+                (7_499, true),
+                (7_500, false),
+                (12_499, false),
+                (12_500, false),
+                (u32::MAX, false),
+            ] {
                 let aimed = at(first, Mode::Mid7);
                 let later = at(first.wrapping_add(away), Mode::Mid7);
                 assert_eq!(aimed.serves(&later, &clock, false), serves, "{first} {away}");
-                assert!(aimed.serves(&later, &clock, true), "{first} {away}");
+                assert_eq!(aimed.serves(&later, &clock, true), away < 12_500, "{first} {away}");
                 for nothing_newer in [false, true] {
                     let another = Decision { mode: Mode::Mid3, ..later };
                     assert!(!aimed.serves(&another, &clock, nothing_newer), "{first} {away}");
