@@ -107,7 +107,7 @@ pub struct Committed {
     pub volt_seconds: Option<AlphaBeta>,
     /// Ripple flux of the pattern at the horizon, in Wb; `None` where there is none.
     pub ripple_wb: Option<AlphaBeta>,
-    /// Expected length of the carrier half that begins there, in s, greater than zero.
+    /// Expected time for which the next voltage acts, in s, greater than zero: a half of the carrier, or a control period where that is longer.
     pub interval_s: f32,
 }
 

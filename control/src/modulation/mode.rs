@@ -336,6 +336,12 @@ impl Mode {
         self.carriers() / 6
     }
 
+    /// `true` for a mode whose flux stands off its fundamental at the boundaries: all patterns.
+    #[inline(always)]
+    pub const fn has_path(self) -> bool {
+        self.is_pattern() || self.is_optimal()
+    }
+
     /// `true` if the mean voltage of each carrier half follows the command: the modes with a triangular carrier.
     #[inline]
     pub const fn is_carrier(self) -> bool {

@@ -207,7 +207,7 @@ impl Modulator {
 
     fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
         let from = self.mode;
-        self.left = (!from.is_carrier() && mode.is_carrier()).then_some((from, self.next_half as u8));
+        self.left = (from.has_path() && mode.is_carrier()).then_some((from, self.next_half as u8));
         self.next_half = first_half(from, mode, self.next_half, pulse);
         self.mode = mode;
         self.plan = None;

@@ -140,7 +140,7 @@ pub(super) struct Wanted {
     pub udc_v: f32,
 }
 
-/// Expected length of a half of a mode, in s.
+/// Expected time for which a command of a mode acts, in s: that of a half, or a control period where that is longer.
 #[inline(always)]
 pub(super) fn interval_s(mode: Mode, omega: f32, settings: &Settings) -> f32 {
     let Settings { clock, devices, .. } = settings;
@@ -149,8 +149,8 @@ pub(super) fn interval_s(mode: Mode, omega: f32, settings: &Settings) -> f32 {
         0 => shortest_s,
         carriers => core::f32::consts::PI / (carriers as f32 * omega.abs()),
     };
-    // A carrier's command acts for a control period at least.
-    if mode.is_carrier() && half_s < clock.control_s { clock.control_s } else { half_s }
+    // A command acts for a control period at least.
+    if half_s < clock.control_s { clock.control_s } else { half_s }
 }
 
 /// The modulator's pulses from `now`, the instant of the currents, until a command of this period can act.
@@ -197,10 +197,10 @@ impl Half {
     /// pattern that begins there.
     fn ripple_wb(&self, decided: Mode, steady: &Steady) -> Option<AlphaBeta> {
         let (mode, end) = (self.half.mode, u32::from(self.half.half) + 1);
-        if has_path(decided) {
+        if decided.has_path() {
             return Some(self.ripple_at(decided, number(mode, decided, end), steady));
         }
-        has_path(mode).then(|| self.ripple_at(mode, end, steady))
+        mode.has_path().then(|| self.ripple_at(mode, end, steady))
     }
 
     /// A mode's ripple where half number `half` begins, seen in the mirror if the half is: nothing under a carrier.
@@ -208,11 +208,6 @@ impl Half {
         let ripple = ripple_at(mode, half, steady.voltage_v, steady.udc_v, steady.omega.abs());
         AlphaBeta { beta: if self.mirrored { -ripple.beta } else { ripple.beta }, ..ripple }
     }
-}
-
-/// `true` for a mode whose flux stands off its fundamental at the boundaries.
-const fn has_path(mode: Mode) -> bool {
-    mode.is_pattern() || mode.is_optimal()
 }
 
 /// The number of half `half` of a mode in the mode that follows.
