@@ -12,7 +12,7 @@ use crate::options::RunOptions;
 use crate::pattern::{self, Wanted};
 use crate::trace::Recording;
 use crate::verdict::{Verdict, bound, worst};
-use core::f64::consts::TAU;
+use core::f64::consts::{FRAC_2_PI, TAU};
 use serde::Serialize;
 use tractive::modulation::Mode;
 use tractive_tablegen::SmoothMap;
@@ -109,46 +109,76 @@ pub fn verdicts(points: &[Beside], options: &RunOptions) -> [Verdict; 3] {
 /// The ideal samples at the operating point of these rows.
 pub fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine) -> Option<Samples> {
     let last = rows.last()?;
-    let parameters = &machine.folder.parameters;
     let map = SmoothMap::new(&machine.folder.map);
-    let pole_pairs = f64::from(parameters.pole_pairs);
-    let f1_hz = (last.speed_rpm * pole_pairs / 60.0).abs();
-    let omega = TAU * f1_hz;
     // Backward rotation is forward rotation seen in a mirror.
     let mirror = last.speed_rpm.signum();
     let count = rows.len() as f64;
     let mean = |value: &dyn Fn(&crate::trace::Row) -> f64| rows.iter().map(value).sum::<f64>() / count;
     let flux = |row: &crate::trace::Row| map.at(row.id_a, mirror * row.iq_a);
-    let (psi_d, psi_q) = (mean(&|row| flux(row).psi_d_wb), mean(&|row| flux(row).psi_q_wb));
-    let (id, iq) = (mean(&|row| row.id_a), mirror * mean(&|row| row.iq_a));
-    let resistance = parameters.stator_resistance_ohm;
-    let (ud, uq) = (resistance * id - omega * psi_q, resistance * iq + omega * psi_d);
-    let voltage_v = ud.hypot(uq);
-    let wanted = Wanted {
+    let at = Operation {
         mode: last.mode,
-        voltage_v: if last.mode.is_whole() { last.udc_v * core::f64::consts::FRAC_2_PI } else { voltage_v },
+        speed_rpm: last.speed_rpm.abs(),
         udc_v: last.udc_v,
-        f1_hz,
-        cycles: cycles(last.mode),
-        dead_time_us: 0.0,
-        min_pulse_us: options.min_pulse_us(parameters.max_switching_hz),
-        max_switching_hz: machine.tables.ratings.max_switching_hz,
+        current_a: (mean(&|row| row.id_a), mirror * mean(&|row| row.iq_a)),
+        flux_wb: (mean(&|row| flux(row).psi_d_wb), mean(&|row| flux(row).psi_q_wb)),
     };
-    let ripple = Ripple::of(&wanted)?;
-    let voltage_angle = uq.atan2(ud);
-    let mut samples = Samples { angle: Vec::new(), current_a: Vec::new(), torque_nm: Vec::new() };
-    let mut current = (id, iq);
-    for (alpha, beta, angle) in ripple.points {
-        // The rotor stands behind the voltage by the voltage's angle in its frame.
-        let rotor = angle - voltage_angle;
-        let (sin, cos) = rotor.sin_cos();
-        let (d, q) = (psi_d + alpha * cos + beta * sin, psi_q + beta * cos - alpha * sin);
-        current = map.inverse(d, q, current)?;
-        samples.angle.push(angle);
-        samples.current_a.push(current.0 * cos - current.1 * sin);
-        samples.torque_nm.push(mirror * 1.5 * pole_pairs * (d * current.1 - q * current.0));
-    }
+    let mut samples =
+        at.samples(options.min_pulse_us(machine.folder.parameters.max_switching_hz), machine)?;
+    samples.torque_nm.iter_mut().for_each(|torque_nm| *torque_nm *= mirror);
     Some(samples)
+}
+
+/// An operating point in steady state, of a machine that turns forward.
+pub struct Operation {
+    /// Mode.
+    pub mode: Mode,
+    /// Mechanical speed, in r/min, greater than zero.
+    pub speed_rpm: f64,
+    /// DC link, in V.
+    pub udc_v: f64,
+    /// Mean current along d and q, in A.
+    pub current_a: (f64, f64),
+    /// Mean flux linkage along d and q, in Wb.
+    pub flux_wb: (f64, f64),
+}
+
+impl Operation {
+    /// The samples that the mode's own pulses give, none of them shorter than so many µs; nothing where the mode has none for this voltage.
+    pub fn samples(&self, min_pulse_us: f64, machine: &Machine) -> Option<Samples> {
+        let parameters = &machine.folder.parameters;
+        let map = SmoothMap::new(&machine.folder.map);
+        let pole_pairs = f64::from(parameters.pole_pairs);
+        let f1_hz = self.speed_rpm * pole_pairs / 60.0;
+        let omega = TAU * f1_hz;
+        let ((id, iq), (psi_d, psi_q)) = (self.current_a, self.flux_wb);
+        let resistance = parameters.stator_resistance_ohm;
+        let (ud, uq) = (resistance * id - omega * psi_q, resistance * iq + omega * psi_d);
+        let wanted = Wanted {
+            mode: self.mode,
+            voltage_v: if self.mode.is_whole() { self.udc_v * FRAC_2_PI } else { ud.hypot(uq) },
+            udc_v: self.udc_v,
+            f1_hz,
+            cycles: cycles(self.mode),
+            dead_time_us: 0.0,
+            min_pulse_us,
+            max_switching_hz: machine.tables.ratings.max_switching_hz,
+        };
+        let ripple = Ripple::of(&wanted)?;
+        let voltage_angle = uq.atan2(ud);
+        let mut samples = Samples { angle: Vec::new(), current_a: Vec::new(), torque_nm: Vec::new() };
+        let mut current = (id, iq);
+        for (alpha, beta, angle) in ripple.points {
+            // The rotor stands behind the voltage by the voltage's angle in its frame.
+            let rotor = angle - voltage_angle;
+            let (sin, cos) = rotor.sin_cos();
+            let (d, q) = (psi_d + alpha * cos + beta * sin, psi_q + beta * cos - alpha * sin);
+            current = map.inverse(d, q, current)?;
+            samples.angle.push(angle);
+            samples.current_a.push(current.0 * cos - current.1 * sin);
+            samples.torque_nm.push(1.5 * pole_pairs * (d * current.1 - q * current.0));
+        }
+        Some(samples)
+    }
 }
 
 /// A pattern's ripple flux, evenly sampled: (α, β) in Wb, and the angle of the fundamental voltage in rad.

@@ -25,10 +25,18 @@ impl Machine {
             return Ok(machine.clone());
         }
         let folder = MachineFolder::read(&source.folder)?;
-        let tables = source.built_in().unwrap_or_else(|| Box::leak(Box::new(folder.tables())));
-        let machine = Self { folder, tables };
+        let machine = match source.built_in() {
+            Some(tables) => Self { folder, tables },
+            None => Self::of(folder),
+        };
         loaded().push((source, machine.clone()));
         Ok(machine)
+    }
+
+    /// The machine of a folder, with tables made of it.
+    pub fn of(folder: MachineFolder) -> Self {
+        let tables = Box::leak(Box::new(folder.tables()));
+        Self { folder, tables }
     }
 
     /// `true` if it is the machine of this name in `tables/`, by its contents.

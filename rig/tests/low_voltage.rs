@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::process::Command;
 use tempfile::TempDir;
+use tractive_rig::machine::Machine;
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::{Recorded, Recording};
 use tractive_rig::verdict::FALLS_SHORT;
@@ -102,6 +103,27 @@ fn a_weakened_machine_leaves_its_free_carrier_by_a_locked_one() {
     let mut modes: Vec<_> = recording.rows.iter().map(|row| row.mode.name()).collect();
     modes.dedup();
     assert_eq!(modes, ["async", "sync15", "mid3", "square"]);
+}
+
+/// Of a machine whose pulses make the current half as large again as its largest one, the trip is chosen above that. At 1.3 of the largest current, as without, it
+/// tripped where its free carrier ends.
+#[test]
+fn the_trip_leaves_the_ripple_its_room() {
+    const VALUES: &str = "--pole-pairs 10 --rs 0.0199 --ld 2.02e-3 --lq 8.36e-3 --psi-f 0 --saturation 0.4 --max-current 306 --udc 1500 --udc-min 1500 --udc-max 1500 --max-speed-rpm 1214 --max-switching-hz 900";
+    let folder = made(VALUES);
+    let machine = Machine::load(folder.path().to_str().unwrap()).unwrap();
+    let told_a = machine.folder.parameters.trip_current_a / 1.15;
+    let rows = swept(VALUES, "").rows;
+    let highest_a =
+        rows.iter().flat_map(|row| [row.ia_a, row.ib_a, row.ic_a]).map(f64::abs).fold(0.0, f64::max);
+    assert!(
+        told_a > 1.5 * 306.0 && (0.95..1.05).contains(&(highest_a / told_a)),
+        "{highest_a} A, {told_a} A told"
+    );
+    let usual = made(
+        "--pole-pairs 4 --rs 0.06 --ld 0.36e-3 --lq 0.55e-3 --psi-f 0.0125 --max-current 30 --udc 48 --max-speed-rpm 6000 --max-switching-hz 20000",
+    );
+    assert_eq!(Machine::load(usual.path().to_str().unwrap()).unwrap().folder.parameters.trip_current_a, 39.0);
 }
 
 /// The sweep of a machine of a nameplate's values, which does not trip.

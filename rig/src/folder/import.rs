@@ -5,7 +5,7 @@ use super::header::QUANTITIES;
 use super::ratings::Ratings;
 use super::rectangle::Rectangle;
 use super::samples::{Sample, read};
-use super::write::{self, Contents};
+use super::write;
 use crate::options::finite;
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
@@ -71,10 +71,9 @@ impl Import {
         let half = rectangle.folded(SYMMETRY, &self.map)?;
         half.check_rising(&self.map)?;
         let map = self.resampled(&half)?;
-        let ratings = Ratings::of(&map, &self.given)?;
+        let mut ratings = Ratings::of(&map, &self.given)?;
         let comment = format!("# From {}.\n", self.map.display());
-        let contents =
-            Contents { toml: ratings.toml(&self.given, &self.told()), map: write::csv(&map, &comment) };
+        let contents = ratings.contents(&self.given, &self.told(), write::csv(&map, &comment));
         write::folder(&self.given.out, &contents)?;
         ratings.say(&self.given)
     }

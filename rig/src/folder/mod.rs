@@ -6,6 +6,7 @@ mod import;
 mod nameplate;
 mod ratings;
 mod rectangle;
+mod ripple;
 mod samples;
 mod show;
 mod write;

@@ -2,7 +2,7 @@
 
 use super::given::{ABOVE_ZERO, Given, Range, check};
 use super::ratings::Ratings;
-use super::write::{self, Contents};
+use super::write;
 use crate::options::finite;
 use anyhow::{Result, ensure};
 use clap::Args;
@@ -41,8 +41,8 @@ impl Nameplate {
     pub fn make(&self) -> Result<()> {
         self.check()?;
         let map = self.map();
-        let ratings = Ratings::of(&map, &self.given)?;
-        let contents = Contents { toml: ratings.toml(&self.given, &self.told()), map: self.csv(&map) };
+        let mut ratings = Ratings::of(&map, &self.given)?;
+        let contents = ratings.contents(&self.given, &self.told(), self.csv(&map));
         write::folder(&self.given.out, &contents)?;
         ratings.say(&self.given)
     }

@@ -1,11 +1,13 @@
 //! The ratings that follow from a flux map and the limits, and `machine.toml` of both.
 
 use super::given::Given;
-use super::write::{digits, toml};
+use super::ripple::{ROOM, trip_current_a};
+use super::write::{Contents, digits, toml};
+use crate::machine::Machine;
 use anyhow::{Result, ensure};
 use core::f64::consts::TAU;
 use std::fmt::Write as _;
-use tractive_tablegen::{FluxMap, Optimum, SmoothMap};
+use tractive_tablegen::{FluxMap, MachineFolder, Optimum, SmoothMap};
 
 /// Ratings that follow.
 #[derive(serde::Serialize)]
@@ -18,6 +20,8 @@ pub struct Ratings {
     rated_speed_rpm: f64,
     /// Flux linkage without current, in Wb.
     magnet_wb: f64,
+    /// The current that the drive trips at, in A, where the ripple leaves the usual one no room.
+    trip_current_a: Option<f64>,
 }
 
 /// Rated torque, as a share of the largest, and rated speed over the corner of the largest: a machine's usual proportions.
@@ -62,13 +66,24 @@ impl Ratings {
             rated_torque_nm: rounded_down(RATED_TORQUE * max_torque_nm),
             rated_speed_rpm: rounded_down((RATED_SPEED * corner_rpm).min(given.max_speed_rpm)),
             magnet_wb: smooth.at(0.0, 0.0).psi_d_wb,
+            trip_current_a: None,
         })
     }
 
-    /// `machine.toml`; `command` are the words that made it.
-    pub fn toml(&self, given: &Given, command: &str) -> String {
+    /// The two files of a folder with this `flux_map.csv`; `command` are the words that made it. The ripple of the machine's pulses is looked at, and where
+    /// it needs room a trip of its own chosen.
+    pub fn contents(&mut self, given: &Given, command: &str, map: String) -> Contents {
+        // What the generator or the drive refuses is told where it is written.
+        let folder = MachineFolder::parse(&self.toml(given, command), &map).ok();
+        let machine = folder.map(Machine::of).filter(|machine| machine.tables.check().is_ok());
+        self.trip_current_a = machine.and_then(|machine| trip_current_a(&machine)).map(rounded_down);
+        Contents { toml: self.toml(given, command), map }
+    }
+
+    /// `machine.toml`.
+    fn toml(&self, given: &Given, command: &str) -> String {
         let [least_v, nominal_v, most_v] = given.link_v().map(digits);
-        let lines: [(&str, f64, &str); 13] = [
+        let lines: [(&str, f64, &str); 14] = [
             ("pole_pairs", f64::from(given.pole_pairs), "given"),
             ("stator_resistance_ohm", given.rs, "given"),
             ("max_torque_nm", self.max_torque_nm, "derived: the most within max_current_a"),
@@ -85,6 +100,11 @@ impl Ratings {
             ("dc_link_nominal_v", nominal_v, "given"),
             ("dc_link_max_v", most_v, of(given.udc_max, "chosen: 1.2 of the nominal one")),
             ("max_switching_hz", given.max_switching_hz, "given"),
+            (
+                "trip_current_a",
+                self.trip_current_a.unwrap_or(f64::NAN),
+                "chosen: 0.15 above the ripple's highest current at full torque",
+            ),
             ("rotor_inertia_kg_m2", given.inertia.unwrap_or(f64::NAN), "given"),
         ];
         toml(&given.name(), &format!("machine {command}"), &lines)
@@ -127,6 +147,15 @@ impl Ratings {
                 text,
                 "\nwithout current the machine makes {emf_v:.1} V peak between lines at {} r/min, above the link's {highest_v} V: gates off, the diodes charge it",
                 given.max_speed_rpm,
+            );
+        }
+        if let Some(trip_a) = self.trip_current_a {
+            let _ = write!(
+                text,
+                "\nwith the ripple of {} Hz the current is up to {:.*} A at full torque: the drive trips at {trip_a} A, which the devices must bear",
+                given.max_switching_hz,
+                usize::from(trip_a < 100.0),
+                trip_a / (1.0 + ROOM)
             );
         }
         text

@@ -58,6 +58,8 @@ struct Limits {
     /// Torque that the mode gives less than square wave would, for its smaller fundamental, in percent of the largest.
     lost_to_mode_percent: f64,
     current_a: f64,
+    /// The highest current of a phase with the ripple of the mode's pulses, in A; nothing where the mode has none.
+    peak_current_a: Option<f64>,
     voltage_v: f64,
 }
 
@@ -77,10 +79,13 @@ struct ModeLimits {
 }
 
 /// A machine with what is looked up again and again.
-struct View<'a> {
-    machine: &'a Machine,
-    map: SmoothMap,
-    devices: SwitchLimits,
+pub struct View<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// Its map.
+    pub map: SmoothMap,
+    /// Its inverter's devices.
+    pub devices: SwitchLimits,
     clock: Clock,
 }
 
@@ -128,7 +133,8 @@ pub fn page(machine: &Machine) -> Result<String> {
 }
 
 impl<'a> View<'a> {
-    fn of(machine: &'a Machine) -> Self {
+    /// View of a machine.
+    pub fn of(machine: &'a Machine) -> Self {
         let max_switching_hz = machine.tables.ratings.max_switching_hz;
         let clock = run::clock(Clock::control_hz(max_switching_hz));
         let min_pulse_s = 1e-6 * usual_min_pulse_us(max_switching_hz.into());
@@ -142,7 +148,7 @@ impl<'a> View<'a> {
     }
 
     /// The point of a torque at a speed, with a link in V of which a mode uses so much.
-    fn point(&self, torque_nm: f64, speed_rpm: f64, udc_v: f64, modulation_index: f32) -> OperatingPoint {
+    pub fn point(&self, torque_nm: f64, speed_rpm: f64, udc_v: f64, modulation_index: f32) -> OperatingPoint {
         let limit = VoltageLimit { udc_v: udc_v as f32, modulation_index, filled: false };
         operating_point(torque_nm as f32, self.omega(speed_rpm) as f32, &limit, self.machine.tables)
     }
@@ -204,7 +210,7 @@ impl<'a> View<'a> {
         ];
         page.draw_xy(None, "voltage over speed, nominal link", (speed, "V, peak phase"), &voltages);
         let turn_ons = |rpm: f64, mode: Mode| self.turn_ons_s(rpm, mode);
-        let used = self.modes();
+        let used = self.modes(nominal_v);
         let strategy: Series = used
             .iter()
             .filter_map(|(mode, from, to)| {
@@ -253,13 +259,13 @@ impl<'a> View<'a> {
         }
     }
 
-    fn rate(&self, speed_rpm: f64) -> f32 {
+    /// Rate of the stator's angle at a mechanical speed, in turns of 2³² a tick.
+    pub fn rate(&self, speed_rpm: f64) -> f32 {
         (self.omega(speed_rpm) / TAU / f64::from(self.clock.ticks_per_s) * 4_294_967_296.0) as f32
     }
 
-    /// The modes that the drive's own schedule wants on the way up at full torque and power, each with its first and last speed.
-    fn modes(&self) -> Vec<(Mode, f64, f64)> {
-        let udc_v = self.machine.folder.parameters.dc_link_nominal_v;
+    /// The modes that the drive's own schedule wants with a link in V on the way up at full torque and power, each with its first and last speed.
+    pub fn modes(&self, udc_v: f64) -> Vec<(Mode, f64, f64)> {
         let mut schedule = Schedule::new(&self.clock);
         let mut used: Vec<(Mode, f64, f64)> = Vec::new();
         let mut mode = Mode::Async;
@@ -286,6 +292,7 @@ impl<'a> View<'a> {
             ("max_torque_nm", parameters.max_torque_nm),
             ("max_power_kw", 1e-3 * parameters.max_power_w),
             ("max_current_a", parameters.max_current_a),
+            ("trip_current_a", parameters.trip_current_a),
             ("max_speed_rpm", parameters.max_speed_rpm),
             ("max_switching_hz", parameters.max_switching_hz),
             ("dc_link_nominal_v", parameters.dc_link_nominal_v),
@@ -325,13 +332,13 @@ impl<'a> View<'a> {
             }),
             largest_voltage_percent: 100.0 * f64::from(index_limit(mode, self.rate(to_rpm), &self.devices)),
         };
-        self.modes().into_iter().map(of).collect()
+        self.modes(parameters.dc_link_nominal_v).into_iter().map(of).collect()
     }
 
     fn limits(&self) -> Vec<Limits> {
         let parameters = &self.machine.folder.parameters;
         let (most_nm, udc_v) = (parameters.max_torque_nm, parameters.dc_link_nominal_v);
-        let used = self.modes();
+        let used = self.modes(udc_v);
         let of = |rpm: f64| {
             let mode = used.iter().find(|(_, from, to)| (*from..=*to).contains(&rpm));
             let mode = mode.map_or(Mode::Async, |(mode, ..)| *mode);
@@ -351,6 +358,7 @@ impl<'a> View<'a> {
                 lost_to_max_power_percent: percent(torque_nm - envelope_nm),
                 lost_to_mode_percent: percent(torque_nm.min(envelope_nm) - in_mode_nm),
                 current_a: f64::from(point.current.d).hypot(point.current.q.into()),
+                peak_current_a: self.peak_a(mode, rpm, udc_v),
                 voltage_v: self.voltage_v(&point, rpm),
             }
         };

@@ -1,0 +1,45 @@
+//! The current that the pulses make at full torque: the operating point's, and the ripple of its mode.
+
+use super::show::View;
+use crate::bound::Operation;
+use crate::machine::Machine;
+use crate::options::usual_min_pulse_us;
+use tractive::modulation::{Mode, index_limit};
+
+/// Least distance of the trip from the highest current at full torque, as a share of it: room for steps and changes of mode.
+pub const ROOM: f64 = 0.15;
+
+/// The current that the drive trips at, in A, where the machine's own default leaves the ripple no room: in steady state at full torque, of any mode and
+/// link in normal operation, the current stays well below it.
+pub fn trip_current_a(machine: &Machine) -> Option<f64> {
+    let trip_a = (1.0 + ROOM) * highest_a(machine);
+    (trip_a > machine.folder.parameters.trip_current_a).then_some(trip_a)
+}
+
+/// Highest current of a phase at full torque in steady state, ripple and all, in A: at both ends and in the middle of each mode's speeds, with the
+/// lowest, nominal and highest link.
+fn highest_a(machine: &Machine) -> f64 {
+    let view = View::of(machine);
+    let parameters = &machine.folder.parameters;
+    let links = [parameters.dc_link_min_v, parameters.dc_link_nominal_v, parameters.dc_link_max_v];
+    let modes = links.iter().flat_map(|udc_v| view.modes(*udc_v).into_iter().map(move |mode| (*udc_v, mode)));
+    let ends = modes.flat_map(|(udc_v, (mode, from, to))| {
+        [from, 0.5 * (from + to), to].map(|speed_rpm| (udc_v, mode, speed_rpm))
+    });
+    ends.filter_map(|(udc_v, mode, speed_rpm)| view.peak_a(mode, speed_rpm, udc_v)).fold(0.0, f64::max)
+}
+
+impl View<'_> {
+    /// Highest current of a phase at full torque in a mode, in A, with a link in V; nothing where the mode has no pulses there.
+    pub fn peak_a(&self, mode: Mode, speed_rpm: f64, udc_v: f64) -> Option<f64> {
+        let index = index_limit(mode, self.rate(speed_rpm), &self.devices);
+        let point = self.point(self.machine.envelope_nm(speed_rpm), speed_rpm, udc_v, index);
+        let (id, iq) = (point.current.d.into(), point.current.q.into());
+        let at = self.map.at(id, iq);
+        let flux_wb = (at.psi_d_wb, at.psi_q_wb);
+        let min_pulse_us = usual_min_pulse_us(self.machine.folder.parameters.max_switching_hz);
+        let samples = Operation { mode, speed_rpm, udc_v, current_a: (id, iq), flux_wb }
+            .samples(min_pulse_us, self.machine)?;
+        Some(samples.current_a.iter().map(|current| current.abs()).fold(0.0, f64::max))
+    }
+}
