@@ -11,7 +11,7 @@ use std::process::Command;
 use tractive::identification::Stage;
 use tractive::modulation::Mode;
 use tractive_rig::bench::Wiring;
-use tractive_rig::identify::{Identify, Outcome, identified};
+use tractive_rig::identify::{Identify, Outcome, contents, identified};
 use tractive_rig::machine::Machine;
 use tractive_rig::scenario::catalogue::{self, Chosen};
 use tractive_rig::scenario::traction::identification;
@@ -568,6 +568,62 @@ fn the_map_goes_on_with_its_bend_where_ripple_is() {
 }
 
 /// A fault in the midst of the experiment: gates off, exit code 1, nothing written beside or in the place of the folder.
+/// A demagnetisation limit is kept by the stairs, the pulses and the turn, and it and the patterns are keys of the folder that comes of them. Without it
+/// the pulses go to 0.96 of the largest current against the magnets' flux.
+#[test]
+fn a_demagnetisation_limit_is_kept_and_handed_on() {
+    [("pmasynrm-180kw", -160.5), ("pmsm-48v-1kw", -15.5)].par_iter().for_each(|(name, least_a)| {
+        let place = tempfile::tempdir().unwrap();
+        let machine = limited(name, *least_a, place.path());
+        let words = flaws_of(&machine).join(" ");
+        let stand = identification::Stand {
+            inertia_kg_m2: machine.folder.parameters.rotor_inertia_kg_m2,
+            fault_at_s: None,
+        };
+        let recording = identification::drive(&parsed(&words).options, &machine, &stand).unwrap();
+        let boundaries = recording.observations.iter().map(|observation| observation.current.d);
+        let lowest_share = f64::from(boundaries.fold(0.0, f32::min)) / least_a;
+        assert!((0.9..1.02).contains(&lowest_share), "{name}: {lowest_share} of the limit");
+        let found: toml::Table = contents(&outcome(&machine, &words), &machine).toml.parse().unwrap();
+        assert_eq!(
+            (found["min_id_a"].as_float(), found["patterns"].as_str()),
+            (Some(*least_a), Some("optimal"))
+        );
+        is_found_and_driven(&place.path().join("limited"));
+    });
+}
+
+/// A limit that leaves the pulses nothing against the magnets' flux is refused by its key.
+#[test]
+fn a_limit_without_pulses_along_d_is_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let values = "--pole-pairs 4 --rs 0.06 --ld 0.36e-3 --lq 0.36e-3 --psi-f 0.0125 --max-current 30 --udc 48 --max-speed-rpm 4000 --max-switching-hz 20000";
+    let folder = new(values, place.path(), "surface");
+    let file = folder.join("machine.toml");
+    std::fs::write(&file, std::fs::read_to_string(&file).unwrap() + "min_id_a = -2.9\n").unwrap();
+    let machine = Machine::load(folder.to_str().unwrap()).unwrap();
+    let refused = identified(&parsed(""), &machine).err().unwrap().to_string();
+    assert_eq!(
+        refused,
+        "min_id_a -2.9: must be at or below -3: the experiment's pulses along d take 0.1 of max_current_a"
+    );
+}
+
+/// A machine of `tables/` with a demagnetisation limit and optimised patterns.
+fn limited(name: &str, least_a: f64, place: &Path) -> Machine {
+    let (from, folder) =
+        (Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables").join(name), place.join("limited"));
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::copy(from.join("flux_map.csv"), folder.join("flux_map.csv")).unwrap();
+    let text = std::fs::read_to_string(from.join("machine.toml")).unwrap();
+    std::fs::write(
+        folder.join("machine.toml"),
+        format!("{text}\nmin_id_a = {least_a}\npatterns = \"optimal\"\n"),
+    )
+    .unwrap();
+    Machine::load(folder.to_str().unwrap()).unwrap()
+}
+
 #[test]
 fn a_fault_ends_the_experiment_with_gates_off_and_nothing_half_written() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();

@@ -90,7 +90,7 @@ const LED_SHARE: f32 = 0.05;
 /// Least inductance along d, as a share of the least that was seen: of the first, and once pulses along d have seen all.
 const FLOOR_SHARES: [f32; 2] = [0.2, 0.5];
 
-/// Direct currents along d, as shares of the bound, and commands for each: first those beside which no current along q takes a rotor back that
+/// Direct currents along d, as shares of the bound or, negative ones, of the machine's least current along d, and commands for each: first those beside which no current along q takes a rotor back that
 /// turns away. Two of them show the resistance.
 const STAIRCASE: [f32; 8] = [0.1, 0.2, -0.1, -0.25, -0.5, -0.75, -0.9, -0.6];
 const STEP_COMMANDS: u32 = 36;
@@ -107,8 +107,8 @@ const REST: u32 = 16;
 /// Shares of the bound at which the pulses along d and along q begin.
 const FIRST_SHARES: [f32; 2] = [0.5, 0.2];
 
-/// Current along d beside the pulses along q and of the turning rotor, as a share of the bound: no phase is without current for long. Beside
-/// the last pulses it goes to and fro between two shares. Ways in a command, at first and growing by as much with each command: no two ways
+/// Current along d beside the pulses along q and of the turning rotor, as a share of the least one: no phase is without current for long. Beside
+/// the last pulses it goes to and fro between shares of the bound and of that. Ways in a command, at first and growing by as much with each command: no two ways
 /// take as long, so that pulses along q whose to and fro fits into one of them come elsewhere in the next.
 const HELD_D: f32 = -0.2;
 const SWEPT: [f32; 2] = [0.18, -0.93];
@@ -271,13 +271,8 @@ impl Course {
         if before == Stage::AlongD && self.stage != before {
             inductance.settle(FLOOR_SHARES[1]);
         }
-        let region = |held: Dq| Region {
-            along_q: self.stage != Stage::AlongD,
-            held: held * bound_a,
-            bound_a,
-            reach,
-            ratings,
-        };
+        let region =
+            |held: Dq| Region { along_q: self.stage != Stage::AlongD, held, bound_a, reach, ratings };
         match self.stage {
             Stage::Probe if self.step > 0 => {
                 let [d, q] = AROUND.get((self.commands % 4) as usize).copied().unwrap_or([0.0; 2]);
@@ -288,32 +283,34 @@ impl Course {
             Stage::Staircase => {
                 let share = STAIRCASE.get(self.step as usize).copied().unwrap_or(0.0);
                 let back = if share < 0.0 { self.pulses.back_share(ratings.pole_pairs) } else { 0.0 };
-                let change = Self::lead(ahead, Dq { d: share, q: back } * bound_a, bound_a);
+                let held = Dq { d: along_d_a(share, ratings), q: back * bound_a };
+                let change = Self::lead(ahead, held, bound_a);
                 Dq { q: change.q * STEERED, ..change }
             }
             Stage::AlongD => {
-                let back = Dq { d: 0.0, q: self.pulses.back_share(ratings.pole_pairs) };
-                let region = region(back);
+                let back = self.pulses.back_share(ratings.pole_pairs);
+                let region = region(Dq { d: 0.0, q: back * bound_a });
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::AlongQ => {
-                let region = region(Dq { d: HELD_D, q: 0.0 });
+                let region = region(Dq { d: along_d_a(HELD_D, ratings), q: 0.0 });
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::AlongBoth => {
-                let region = region(Dq { d: self.swept() * self.pulses.share(), q: 0.0 });
+                let region = region(Dq { d: along_d_a(self.swept() * self.pulses.share(), ratings), q: 0.0 });
                 self.pulses.change(ahead, &region, inductance)
             }
             Stage::Done if self.step > 0 => NONE,
             Stage::Rest | Stage::Done => Self::lead(ahead, NONE, bound_a),
             Stage::Turn => {
                 let share = [TURN_SHARE, 0.0, -TURN_SHARE].get(self.step as usize).copied().unwrap_or(0.0);
-                Self::lead(ahead, Dq { d: HELD_D, q: share } * bound_a, bound_a)
+                let held = Dq { d: along_d_a(HELD_D, ratings), q: share * bound_a };
+                Self::lead(ahead, held, bound_a)
             }
         }
     }
 
-    /// The slow sweep along d, as a share of the bound.
+    /// The slow sweep along d, as a share of the bound, or of the least current along d.
     fn swept(&self) -> f32 {
         let commands = self.commands as f32;
         let ways = commands * (SWEEPS + 0.5 * SWEEPS_GROWTH * commands);
@@ -407,4 +404,9 @@ impl Course {
         let lacks = (low.0 - low.1 * self.resistance_ohm) / along_d;
         self.lacking_v = if lacks > 0.0 { lacks } else { 0.0 };
     }
+}
+
+/// Current along d, in A: a share of the bound, or if it is negative of the machine's least current along d.
+fn along_d_a(share: f32, ratings: &Ratings) -> f32 {
+    share * if share < 0.0 { -ratings.min_id_a } else { ratings.max_current_a }
 }

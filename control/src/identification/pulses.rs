@@ -140,7 +140,8 @@ impl Pulses {
             if self.q > 0.0 { next > positive } else { next < -negative }
         } else {
             let next = ahead.d + change.d;
-            if self.d > 0.0 { next > POSITIVE_SHARE * bound_a } else { next < -bound_a }
+            let least_a = self.share * KEPT_SHARE * region.ratings.min_id_a;
+            if self.d > 0.0 { next > POSITIVE_SHARE * bound_a } else { next < least_a }
         };
         if beyond {
             self.turn_to(-before, region);

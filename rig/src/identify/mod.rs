@@ -35,7 +35,7 @@ use crate::scenario::System;
 use crate::scenario::traction::identification::{self, Stand};
 use crate::scenario::traction::{Traction, TractionOptions};
 use crate::trace::Recorded;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use serde_json::Map;
 use std::path::PathBuf;
@@ -97,11 +97,20 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Least share of the largest current that pulses against the magnets' flux must be allowed: with less a rotor turns away.
+const LEAST_ID_SHARE: f64 = 0.1;
+
 /// The outcome of an experiment, or the fault that has ended it.
 ///
 /// # Errors
 /// As [`command`].
 pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
+    let (least_a, bound_a) = (machine.folder.parameters.min_id_a, machine.folder.parameters.max_current_a);
+    ensure!(
+        least_a <= -LEAST_ID_SHARE * bound_a,
+        "min_id_a {least_a}: must be at or below {}: the experiment's pulses along d take {LEAST_ID_SHARE} of max_current_a",
+        -LEAST_ID_SHARE * bound_a
+    );
     if let Some(interface) = &identify.can {
         return on_bus(interface, machine);
     }
@@ -130,7 +139,6 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
         };
         (recording, observed)
     };
-    let bound_a = parameters.max_current_a;
     let observations = match observed.and_then(|observations| complete(observations, bound_a)) {
         Ok(observations) => observations,
         Err(ended) => return Ok(Err(ended)),

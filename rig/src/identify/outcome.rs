@@ -84,7 +84,7 @@ pub struct Outcome {
     pub flux_rms: f64,
     /// The worst error, likewise.
     pub flux_worst: f64,
-    /// Error of the magnets' flux linkage, as a share.
+    /// Error of the magnets' flux linkage, as a share; not a number without magnets.
     pub magnet_error: f64,
     /// Error of the resistance, as a share.
     pub resistance_error: f64,
@@ -139,7 +139,7 @@ impl Outcome {
             turned_deg: turned_deg(observations, pole_pairs),
             flux_rms: of(|fit, truth, machine| flux_errors(fit, truth, machine).0),
             flux_worst: of(|fit, truth, machine| flux_errors(fit, truth, machine).1),
-            magnet_error: of(|fit, truth, _| fit.flux(0.0, 0.0).0 / truth.flux(0.0, 0.0).0 - 1.0),
+            magnet_error: of(magnet_error),
             resistance_error: of(|fit, truth, _| fit.resistance_ohm / truth.resistance_ohm - 1.0),
             torque_worst: of(torque_error),
             signs: Signs::of(observations, &fit, bound_a),
@@ -258,12 +258,14 @@ fn largest_phase_a([alpha, beta]: [f64; 2]) -> f64 {
 
 /// Errors of the flux linkage within the circle, as shares of the largest there: root mean square, worst.
 fn flux_errors(fit: &Fit, truth: &Truth, machine: &Machine) -> (f64, f64) {
-    let bound_a = machine.folder.parameters.max_current_a;
+    let parameters = &machine.folder.parameters;
+    let bound_a = parameters.max_current_a;
+    let allowed = parameters.min_id_a..=truth.last_d_a.min(0.2 * bound_a);
     let (mut most, mut sum, mut worst, mut count) = (0.0_f64, 0.0, 0.0_f64, 0.0);
     for d in -50..=50 {
         for q in -50..=50 {
             let (id, iq) = (0.02 * f64::from(d) * bound_a, 0.02 * f64::from(q) * bound_a);
-            if id.hypot(iq) > JUDGED * bound_a || id > truth.last_d_a.min(0.2 * bound_a) {
+            if id.hypot(iq) > JUDGED * bound_a || !allowed.contains(&id) {
                 continue;
             }
             let (found, is) = (fit.flux(id, iq), truth.flux(id, iq));
@@ -275,6 +277,13 @@ fn flux_errors(fit: &Fit, truth: &Truth, machine: &Machine) -> (f64, f64) {
         }
     }
     ((sum / count).sqrt() / most, worst / most)
+}
+
+/// Error of the magnets' flux linkage, as a share; not a number where there is none but the map's rounding.
+fn magnet_error(fit: &Fit, truth: &Truth, machine: &Machine) -> f64 {
+    let (magnets, most) =
+        (truth.flux(0.0, 0.0).0, truth.flux(0.0, machine.folder.parameters.max_current_a).1);
+    if magnets.abs() > 1e-9 * most { fit.flux(0.0, 0.0).0 / magnets - 1.0 } else { f64::NAN }
 }
 
 /// Worst error of the torque along the map's own MTPA, as a share of the largest torque.

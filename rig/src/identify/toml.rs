@@ -3,7 +3,7 @@
 use super::Outcome;
 use crate::folder::{digits, toml};
 use core::f64::consts::TAU;
-use tractive_tablegen::{FluxMap, Optimum, Parameters, SmoothMap};
+use tractive_tablegen::{FluxMap, Optimum, Parameters, Patterns, SmoothMap};
 
 /// The text. The largest torque is the nameplate's, or what the map gives within the largest current, whichever is less; so is the largest power.
 pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
@@ -16,7 +16,7 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
         given.max_power_w.min(digits((1.0 - 1e-6) * max_torque_nm * given.max_speed_rpm * TAU / 60.0));
     let (resistance, inertia) =
         (digits(outcome.fit.resistance_ohm.max(0.0)), digits(outcome.rotor.inertia_kg_m2));
-    let keys: [(&str, f64, &str); 21] = [
+    let keys: [(&str, f64, &str); 22] = [
         ("pole_pairs", f64::from(given.pole_pairs), "given"),
         ("stator_resistance_ohm", resistance, "identified"),
         ("max_torque_nm", max_torque_nm, "given, as far as the map gives it"),
@@ -29,6 +29,7 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
         ("dc_link_nominal_v", given.dc_link_nominal_v, "given"),
         ("dc_link_max_v", given.dc_link_max_v, "given"),
         ("max_switching_hz", given.max_switching_hz, "given"),
+        ("min_id_a", given.min_id_a, "given"),
         ("trip_current_a", given.trip_current_a, "given"),
         ("trip_dc_over_v", given.trip_dc_over_v, "given"),
         ("trip_dc_under_v", given.trip_dc_under_v, "given"),
@@ -39,5 +40,9 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
         ("loss_quadratic_fraction", given.loss_quadratic_fraction, "given"),
         ("iron_loss_share", given.iron_loss_share, "given"),
     ];
-    toml(&given.name, "identify", &keys)
+    let text = toml(&given.name, "identify", &keys);
+    match given.patterns {
+        Patterns::Paper => text,
+        Patterns::Optimal => text + &format!("{:<40}# given\n", "patterns = \"optimal\""),
+    }
 }
