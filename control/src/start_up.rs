@@ -1,11 +1,12 @@
 //! Initial angle at standstill: a law whose voltage pulses show where the rotor of a machine stands whose sensor only counts.
 //!
 //! 1. **Still**: the gates stay off until the sensor has counted nothing for a while.
-//! 2. **Axis**: a pulse in each of twelve directions, round after round, each followed by its opposite, which takes the flux linkage away again.
+//! 2. **Axis**: a pulse in each of twelve directions, round after round, each followed by its opposite, which takes the flux linkage away again: each
+//!    command makes up for what the halves before it have made of theirs, as a carrier of a control period's length has one or two for a command.
 //!    With `i = A ψ + B ψ*` as complex numbers, the sum of `Δi Δψ` over all directions keeps `B`, whose angle is twice that of the d axis,
-//!    along which the inductance is least. Dead time, offsets and saturation fall out of the sum, or do not turn it.
+//!    along which the inductance is least, and of `A` what pulses of unequal length leave. Dead time, offsets and saturation fall out of the sum, or do not turn it.
 //! 3. **Polarity**: magnets saturate the iron along +d, so that a pulse there takes more current than one along −d. Over all directions the currents
-//!    of the pulses add up to nothing but that.
+//!    of the pulses add up to nothing but that. A machine without magnets has none to be found.
 //! 4. **Push**: a machine whose currents do not show it shows its polarity by turning: a current along q moves the rotor by half a degree or so,
 //!    and the opposite current stops it again; so do shorter ones what drift is left.
 //!
@@ -14,7 +15,7 @@
 #![forbid(unsafe_code)]
 
 use crate::frames::{AlphaBeta, Angle, SinCos, sqrt};
-use crate::machine::Ratings;
+use crate::machine::Tables;
 
 /// Time for which the rotor has to stand still, in s, and what counts as still, electrical: 1°.
 const STILL_S: f32 = 0.1;
@@ -24,8 +25,8 @@ const TURNED: Angle = Angle(35_791_394);
 /// Turn that shows which way a push goes: 2°.
 const PUSHED: Angle = Angle(23_860_929);
 
-/// Flux linkage of a pulse, as a share of the magnets'.
-const PULSE_SHARE: f32 = 0.17;
+/// Flux linkage of a pulse, as a share of the magnets'; without magnets that of a current along d, as a share of the largest.
+pub const PULSE_SHARE: f32 = 0.17;
 /// Commands without voltage before the first pulse.
 const LEAD: u32 = 4;
 /// Pulses of the rounds, in twelve directions each.
@@ -56,8 +57,10 @@ pub struct StartUpInput<'a> {
     pub limit_v: f32,
     /// Time for which a command acts, in s, greater than zero.
     pub interval_s: f32,
+    /// Volt-seconds from the last boundary that was observed until the command acts, in V·s.
+    pub committed: AlphaBeta,
     /// The machine.
-    pub ratings: &'a Ratings,
+    pub tables: &'a Tables,
 }
 
 /// The outcome of a step.
@@ -102,16 +105,19 @@ pub struct StartUp {
     pushed_from: Angle,
     against: bool,
     drifts_on: bool,
-    /// Commands that build the pulse up, and their voltage in V.
+    /// Commands that build the pulse up, and its flux linkage in Wb.
     halves: u32,
-    voltage_v: f32,
-    /// Current at the last boundary, in A.
+    pulse_wb: f32,
+    /// Current at the last boundary, in A; and the volt-seconds of all halves until then, in V·s.
     before: AlphaBeta,
-    /// Sums over the boundaries with a flux linkage: `Δi Δψ`, `Δi·Δψ`, `Δψ²`, the currents of the pulses; and how many they are.
+    flux: AlphaBeta,
+    /// Sums over the boundaries with a flux linkage: `Δi Δψ`, `Δψ Δψ`, `Δi·Δψ`, `Δψ²`, currents and flux linkages of the pulses; and how many they are.
     salient: AlphaBeta,
+    uneven: AlphaBeta,
     round: f32,
     squared: f32,
     polar: AlphaBeta,
+    pulsed: AlphaBeta,
     count: f32,
     /// Electrical angle of the axis where `from` is.
     axis: Angle,
@@ -134,12 +140,15 @@ impl StartUp {
             against: false,
             drifts_on: false,
             halves: 0,
-            voltage_v: 0.0,
+            pulse_wb: 0.0,
             before: NONE,
+            flux: NONE,
             salient: NONE,
+            uneven: NONE,
             round: 0.0,
             squared: 0.0,
             polar: NONE,
+            pulsed: NONE,
             count: 0.0,
             axis: Angle::ZERO,
         }
@@ -154,15 +163,19 @@ impl StartUp {
     pub fn observe(&mut self, current: AlphaBeta, volt_seconds: Option<AlphaBeta>) {
         let (change, twice) = (current - self.before, current + self.before);
         self.before = current;
+        self.flux = self.flux + volt_seconds.unwrap_or_default();
         let Some(flux) = volt_seconds.filter(|_| self.stage == Stage::Axis) else { return };
-        self.salient = self.salient + change.turned(SinCos { sin: flux.beta, cos: flux.alpha });
+        self.salient = self.salient + times(change, flux);
+        self.uneven = self.uneven + times(flux, flux);
         self.round += change.dot(flux);
         self.squared += flux.squared();
         let built = twice.dot(flux);
         if built > 0.0 {
-            (self.polar, self.count) = (self.polar + change, self.count + 1.0);
+            (self.polar, self.pulsed, self.count) =
+                (self.polar + change, self.pulsed + flux, self.count + 1.0);
         } else if built < 0.0 {
-            (self.polar, self.count) = (self.polar - change, self.count + 1.0);
+            (self.polar, self.pulsed, self.count) =
+                (self.polar - change, self.pulsed - flux, self.count + 1.0);
         }
     }
 
@@ -194,33 +207,55 @@ impl StartUp {
             return nothing;
         }
         if self.commands == 0 {
-            (self.halves, self.voltage_v) = pulse(input);
+            (self.halves, self.pulse_wb) = pulse(input);
         }
-        let built = self.commands < self.halves;
         if self.commands == 2 * self.halves {
             (self.commands, self.pulses) = (0, self.pulses + 1);
             self.pushed_from = input.turned;
-            return if self.pulses == PULSES { self.judge() } else { None }.unwrap_or(nothing);
+            if self.pulses == PULSES
+                && let Some(ends) = self.judge(input.tables.ratings.has_magnets())
+            {
+                return ends;
+            }
+            return self.steer(AlphaBeta::default(), input);
         }
         self.commands += 1;
+        let built =
+            if self.commands <= self.halves { self.commands } else { 2 * self.halves - self.commands };
         // Of four directions at right angles one, its opposite, and the others, so that the torques of magnets and of saliency fall out of each
         // four; and then the same 30° further.
         let turned = (self.pulses >> 2).wrapping_mul(Angle::DEG_30.0);
         let across = if self.pulses & 2 == 0 { Angle::ZERO } else { Angle::DEG_90 };
         let direction = Angle(turned ^ self.pulses << 31) + across;
-        StartUpStep::Pulse(along(direction) * if built { self.voltage_v } else { -self.voltage_v })
+        self.steer(along(direction) * (self.pulse_wb * built as f32 / self.halves as f32), input)
     }
 
-    /// The axis, and its polarity if the currents show it.
-    fn judge(&mut self) -> Option<StartUpStep> {
-        let salient = sqrt(self.salient.squared());
+    /// The voltage that makes the halves' volt-seconds so many since the start, in V·s.
+    fn steer(&self, wanted: AlphaBeta, input: &StartUpInput) -> StartUpStep {
+        let voltage = (wanted - self.flux - input.committed) * (1.0 / input.interval_s);
+        let most = input.limit_v / (sqrt(voltage.squared()) + f32::MIN_POSITIVE);
+        StartUpStep::Pulse(if most < 1.0 { voltage * most } else { voltage })
+    }
+
+    /// The axis, and the polarity of its magnets if the currents show it.
+    fn judge(&mut self, has_magnets: bool) -> Option<StartUpStep> {
+        let per = 1.0 / self.squared;
+        let (salient, uneven, round) = (self.salient * per, self.uneven * per, self.round * per);
+        // `A` and `B`, from the sums of `Δi Δψ* = A Δψ Δψ* + B Δψ* Δψ*`, of which `round` is the real part, and of `Δi Δψ = A Δψ Δψ + B Δψ* Δψ`.
+        let a = (round - salient.dot(uneven)) / (1.0 - uneven.squared());
+        let b = salient - uneven * a;
         // Not a number is no axis.
-        let has_axis = salient > SALIENT * self.round;
+        let has_axis = sqrt(b.squared()) > SALIENT * a;
         if !has_axis {
             return Some(StartUpStep::Failed);
         }
-        self.axis = Angle((self.salient.angle().signed() >> 1) as u32);
-        let polar_a = self.polar.park(self.axis.sin_cos()).d;
+        self.axis = Angle((b.angle().signed() >> 1) as u32);
+        if !has_magnets {
+            return Some(self.found(false));
+        }
+        let mirrored = AlphaBeta { beta: -self.pulsed.beta, ..self.pulsed };
+        let polar = self.polar - self.pulsed * a - times(b, mirrored);
+        let polar_a = polar.park(self.axis.sin_cos()).d;
         // The currents' way is the sum of `Δi·Δψ` over the flux linkages' mean.
         let way = POLAR_SHARE * self.round;
         if polar_a * polar_a * self.squared > way * way * self.count {
@@ -267,9 +302,11 @@ impl StartUp {
             Stage::Mend => PUSH_SHARE,
             Stage::Still | Stage::Lead | Stage::Axis | Stage::Drift => 0.0,
         };
-        let wanted = along(self.axis + Angle::DEG_90) * (share * input.ratings.max_current_a);
+        let wanted = along(self.axis + Angle::DEG_90) * (share * input.tables.ratings.max_current_a);
         let lead_ohm = LEAD_SHARE * self.squared / (self.round * input.interval_s);
-        StartUpStep::Pulse((wanted - self.before) * lead_ohm + wanted * input.ratings.stator_resistance_ohm)
+        StartUpStep::Pulse(
+            (wanted - self.before) * lead_ohm + wanted * input.tables.ratings.stator_resistance_ohm,
+        )
     }
 
     /// Found, with d along the axis or against it.
@@ -284,12 +321,22 @@ impl Default for StartUp {
     }
 }
 
-/// Commands that build a pulse up, and their voltage in V.
+/// Commands that build a pulse up, and its flux linkage in Wb.
 fn pulse(input: &StartUpInput) -> (u32, f32) {
-    let pulse_v = PULSE_SHARE * input.ratings.magnet_flux_wb / input.interval_s;
-    let share = pulse_v / input.limit_v;
-    let halves = if share < LONGEST { share as u32 + 1 } else { LONGEST as u32 };
-    (halves, if share < LONGEST { pulse_v / halves as f32 } else { input.limit_v })
+    let ratings = &input.tables.ratings;
+    let pulse_wb = if ratings.has_magnets() {
+        PULSE_SHARE * ratings.magnet_flux_wb
+    } else {
+        -input.tables.flux.at(-PULSE_SHARE * ratings.max_current_a, 0.0)[0]
+    };
+    let most_wb = input.limit_v * input.interval_s;
+    let share = pulse_wb / most_wb;
+    if share < LONGEST { (share as u32 + 1, pulse_wb) } else { (LONGEST as u32, LONGEST * most_wb) }
+}
+
+/// The product of two vectors as complex numbers.
+fn times(one: AlphaBeta, other: AlphaBeta) -> AlphaBeta {
+    one.turned(SinCos { sin: other.beta, cos: other.alpha })
 }
 
 /// The unit vector of a direction.

@@ -58,7 +58,7 @@ mod firmware {
             chosen(ControlTask::new(BuiltIn, settings(), Instant(CLOCK.control_ticks)), &CLOCK);
         let board = BOARD.get_or_insert_with(|| {
             let registers = Registers::CHIP;
-            let sensor = Sensor::of(&registers, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
+            let sensor = Sensor::of(&registers, &POWER_STAGE, &BUILT_IN.ratings);
             Control::new(registers, CONTROL_ZEROS.kept(), sensor, &POSITION)
         });
         TASK.run(board, &SHARED);

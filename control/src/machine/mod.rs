@@ -14,6 +14,8 @@ mod lookup;
 pub use iron_loss::IronLoss;
 pub use lookup::{Curve, Grid};
 
+use crate::frames::Angle;
+
 /// Scalars of a machine folder. SI units, peak values of phase quantities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -64,6 +66,17 @@ impl Ratings {
     #[inline(always)]
     pub const fn least_id_a(&self) -> Option<f32> {
         if self.min_id_a > -self.max_current_a { Some(self.min_id_a) } else { None }
+    }
+
+    /// `true` for a machine with magnets: without them the rotor is the same after half an electrical turn.
+    pub const fn has_magnets(&self) -> bool {
+        // Less is the tables' rounding.
+        self.magnet_flux_wb > 1e-9
+    }
+
+    /// The error of a rotor's angle that matters: without magnets not the half turn in it.
+    pub const fn axis_error(&self, error: Angle) -> Angle {
+        if self.has_magnets() { error } else { Angle(((error.0 << 1) as i32 >> 1) as u32) }
     }
 
     /// A direct-axis current, in A, no lower than the demagnetisation limit.

@@ -1,6 +1,7 @@
 //! An incremental encoder: it counts from where it is switched on, and has no angle before somebody tells it one, or its index passes.
 
 use tractive::frames::Angle;
+use tractive::machine::Ratings;
 
 /// Share of what an index has shown to be wrong that is left after each sample, as a number of bits: the angle mends in some
 /// hundreds of samples, and nobody sees a step.
@@ -18,6 +19,7 @@ pub struct Position {
 /// The encoder.
 #[derive(Clone, Copy, Debug)]
 pub struct Encoder {
+    ratings: &'static Ratings,
     pole_pairs: f64,
     /// The rotor's electrical turns since an index.
     turns: f64,
@@ -30,11 +32,11 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Of a machine with this many pole pairs, its rotor so many mechanical turns behind an index, 0 ..= 1, when it is switched on.
-    pub fn new(pole_pairs: u32, turns: f64) -> Self {
-        let pole_pairs = f64::from(pole_pairs);
+    /// Of a machine, its rotor so many mechanical turns behind an index, 0 ..= 1, when it is switched on.
+    pub fn new(ratings: &'static Ratings, turns: f64) -> Self {
+        let pole_pairs = f64::from(ratings.pole_pairs);
         let turns = turns * pole_pairs;
-        Self { pole_pairs, turns, last: None, first: Angle::ZERO, zero: None, indexed: false }
+        Self { ratings, pole_pairs, turns, last: None, first: Angle::ZERO, zero: None, indexed: false }
     }
 
     /// Electrical turns from the index to where the rotor stood when the encoder was switched on.
@@ -42,10 +44,11 @@ impl Encoder {
         self.turns
     }
 
-    /// Takes the angle of the first sample from somebody who has found it; returns by how much that is ahead, in degrees.
+    /// Takes the angle of the first sample from somebody who has found it; returns by how much that is ahead, in degrees: of a machine without magnets but
+    /// for half a turn.
     pub fn align(&mut self, zero: Angle) -> f64 {
         self.zero = self.zero.or(Some(zero));
-        f64::from((zero - self.first).signed()) / 4_294_967_296.0 * 360.0
+        f64::from(self.ratings.axis_error(zero - self.first).signed()) / 4_294_967_296.0 * 360.0
     }
 
     /// The reading where the rotor has this angle.
@@ -60,7 +63,7 @@ impl Encoder {
         let counted = angle - self.first;
         if self.indexed {
             let zero = self.zero.get_or_insert(self.first);
-            let left = (*zero - self.first).signed();
+            let left = self.ratings.axis_error(*zero - self.first).signed();
             *zero = Angle((zero.signed().wrapping_sub(left >> MENDING_BITS)) as u32);
         }
         let angle = self.zero.map(|zero| zero + counted);

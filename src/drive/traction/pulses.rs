@@ -184,6 +184,12 @@ impl Pulses {
         Some(sum)
     }
 
+    /// The volt-ticks from the newest boundary on of all halves that are loaded and planned, in ticks.
+    pub(super) fn committed_volt_ticks(&self) -> AlphaBeta {
+        let loaded = self.before(1).volt_ticks + self.before(0).volt_ticks;
+        loaded + self.unloaded_volt_ticks().unwrap_or_default()
+    }
+
     /// The half that was loaded so many boundaries before the newest one.
     #[inline(always)]
     pub(super) fn before(&self, boundaries: u32) -> &Half {

@@ -70,7 +70,7 @@ mod firmware {
             ControlTask::with_law(BuiltIn, settings(), Instant(CLOCK.control_ticks), Identification::new());
         let board = BOARD.get_or_insert_with(|| {
             let registers = Registers::CHIP;
-            let sensor = Sensor::of(&registers, &POWER_STAGE, BUILT_IN.ratings.pole_pairs as u32);
+            let sensor = Sensor::of(&registers, &POWER_STAGE, &BUILT_IN.ratings);
             Control::new(registers, CONTROL_ZEROS.kept(), sensor, &POSITION)
         });
         let now = TASK.next_call();

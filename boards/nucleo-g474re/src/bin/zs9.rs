@@ -86,7 +86,7 @@ mod firmware {
             let [first, second] = STAGE.encoder_zeros;
             let encoder = |timer, encoder_zero| {
                 let stage = PowerStage { encoder_zero, ..STAGE.common };
-                Encoder::new(timer, &stage, BUILT_IN.ratings.pole_pairs as u32)
+                Encoder::new(timer, &stage, &BUILT_IN.ratings)
             };
             let encoders = [encoder(registers.tim4, first), encoder(registers.tim3, second)];
             Control::new(registers, kept(), encoders, &POSITION)

@@ -16,6 +16,7 @@ use crate::registers::Registers;
 use crate::start::{StartError, Wait};
 use stm32_metapac::spi::{Spi, vals};
 use tractive::frames::Angle;
+use tractive::machine::Ratings;
 
 /// An encoder of so many bits in a turn, in Gray's code or in plain binary numbers.
 #[derive(Clone, Copy)]
@@ -48,8 +49,8 @@ impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
         Ok(())
     }
 
-    fn of(registers: &Registers, stage: &PowerStage, pole_pairs: u32) -> Self {
-        Self { spi: registers.spi1, pole_pairs, zero: stage.encoder_zero }
+    fn of(registers: &Registers, stage: &PowerStage, ratings: &'static Ratings) -> Self {
+        Self { spi: registers.spi1, pole_pairs: ratings.pole_pairs as u32, zero: stage.encoder_zero }
     }
 
     /// None where the frame has not come, or not as a frame is.

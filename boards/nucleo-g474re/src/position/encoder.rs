@@ -11,10 +11,12 @@ use crate::registers::Registers;
 use crate::start::{StartError, Wait};
 use stm32_metapac::timer::{TimGp16, regs, vals};
 use tractive::frames::Angle;
+use tractive::machine::Ratings;
 
 /// An incremental encoder with an index, counted by TIM4.
 #[derive(Clone, Copy)]
 pub struct Encoder {
+    ratings: &'static Ratings,
     timer: TimGp16,
     units_per_count: u32,
     counts: u32,
@@ -48,10 +50,11 @@ pub const BY_TIM2: vals::Ts = vals::Ts::ITR1;
 const INDEX_TOLERANCE: u32 = 8;
 
 impl Encoder {
-    /// The encoder of a machine with this many pole pairs.
-    pub fn new(timer: TimGp16, stage: &PowerStage, pole_pairs: u32) -> Self {
-        let units_per_count = units_per_count(stage.encoder_counts, pole_pairs);
+    /// The encoder of a machine.
+    pub fn new(timer: TimGp16, stage: &PowerStage, ratings: &'static Ratings) -> Self {
+        let units_per_count = units_per_count(stage.encoder_counts, ratings.pole_pairs as u32);
         Self {
+            ratings,
             timer,
             units_per_count,
             counts: stage.encoder_counts.max(1),
@@ -102,8 +105,8 @@ impl Position for Encoder {
         Ok(())
     }
 
-    fn of(registers: &Registers, stage: &PowerStage, pole_pairs: u32) -> Self {
-        Self::new(registers.tim4, stage, pole_pairs)
+    fn of(registers: &Registers, stage: &PowerStage, ratings: &'static Ratings) -> Self {
+        Self::new(registers.tim4, stage, ratings)
     }
 
     /// Known from the second call after the index on: the flag is read, not captured, and an index between the capture and the
@@ -127,7 +130,9 @@ impl Position for Encoder {
             None if !passed => return self.before_index(turned, index),
             None => {
                 if let Some(found) = self.found {
-                    self.left = self.counted + self.moved + found - (turned + self.zero);
+                    let error = self.counted + self.moved + found - (turned + self.zero);
+                    self.left = self.ratings.axis_error(error);
+                    self.zero = self.zero + error - self.left;
                 }
                 Some((count, 0))
             }

@@ -14,6 +14,7 @@ use super::registers::Registers;
 use super::start::{StartError, Wait};
 use core::sync::atomic::{AtomicU32, Ordering};
 use tractive::frames::Angle;
+use tractive::machine::Ratings;
 
 // The sensor that the power stage's file names: a type that the build script writes.
 include!(concat!(env!("OUT_DIR"), "/position.rs"));
@@ -33,7 +34,7 @@ pub trait Position: Sized {
     fn follow(_registers: &Registers, _wait: &mut dyn Wait) {}
 
     /// The sensor on the shaft of a machine with this many pole pairs.
-    fn of(registers: &Registers, stage: &PowerStage, pole_pairs: u32) -> Self;
+    fn of(registers: &Registers, stage: &PowerStage, ratings: &'static Ratings) -> Self;
 
     /// The angle at the control timer's update; `None` while it is not known, which keeps the gates off. Called in the control interrupt: it may not wait.
     fn angle(&mut self) -> Option<Angle>;

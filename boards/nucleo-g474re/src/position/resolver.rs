@@ -18,6 +18,7 @@ use crate::start::{StartError, Wait};
 use stm32_metapac::gpio::Gpio;
 use stm32_metapac::timer::vals;
 use tractive::frames::{AlphaBeta, Angle};
+use tractive::machine::Ratings;
 
 /// The channel that excites, from 0, and its pin in port B.
 const CHANNEL: usize = 1;
@@ -70,7 +71,7 @@ impl<const TURNS: u32, const AMPLITUDE: u16, const TOGGLE_TICKS: u16> Position
         }
     }
 
-    fn of(registers: &Registers, stage: &PowerStage, _pole_pairs: u32) -> Self {
+    fn of(registers: &Registers, stage: &PowerStage, _ratings: &'static Ratings) -> Self {
         let [sine, cosine] = samplers(registers);
         Self { sine, cosine, port: registers.gpiob, zero: stage.encoder_zero, last: None }
     }

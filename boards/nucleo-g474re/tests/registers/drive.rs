@@ -41,7 +41,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     let (shared, state) = (Shared::new(), PositionState::new());
     let settings = Settings::new(CLOCK, devices());
     let zeros = [AdcCode(2_048); 3];
-    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     let mut control = Control::new(registers, zeros, encoder, &state);
     let mut pwm = Pwm::new(registers, zeros);
     let first_half = Instant(plan().shortest_half_ticks);

@@ -185,7 +185,7 @@ impl Image {
         bench.settle();
         let position: &'static PositionState = Box::leak(Box::new(PositionState::new()));
         let stage = PowerStage { encoder_zero: zero, ..POWER_STAGE };
-        let encoder = Encoder::new(registers.tim4, &stage, BUILT_IN.ratings.pole_pairs as u32);
+        let encoder = Encoder::new(registers.tim4, &stage, &BUILT_IN.ratings);
         let settings = Settings::new(CLOCK, devices());
         let station = CanEndpoint::new(&BUILT_IN.ratings);
         let mut image = Self {

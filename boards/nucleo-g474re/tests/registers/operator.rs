@@ -126,7 +126,7 @@ fn the_operator_hears_of_a_count_and_of_the_temperature_sensors() {
     let station = CanEndpoint::new(&BUILT_IN.ratings);
     let mut serve = Serve::new(registers, Can::CHIP, station, &state, Configuration::Good);
     assert!(!serve.feedback().position_counted);
-    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     Control::new(registers, [AdcCode(2_048); 3], encoder, &state).sample(NOW);
     assert!(serve.feedback().position_counted);
     for code in [1_000, 1_001, 1_002] {

@@ -2,6 +2,7 @@
 
 use crate::bench::{Bench, control_update};
 use crate::plan;
+use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::legs::SoftwareBreak;
 use nucleo_g474re::position::{Encoder, Position, PositionState};
 use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
@@ -13,6 +14,7 @@ use nucleo_g474re::{Control, Pwm};
 use stm32_metapac::gpio::regs::Idr;
 use stm32_metapac::timer::regs::SrGp16;
 use tractive::frames::Angle;
+use tractive::machine::Ratings;
 use tractive::ports::{ControlPort, PwmPort};
 use tractive::protection::{Fault, SafeState};
 use tractive::time::Instant;
@@ -36,7 +38,7 @@ fn pass_index<P: Position>(control: &mut Control<P>, registers: &Registers) {
 #[test]
 fn the_angle_is_that_of_the_trigger_however_late_it_is_read() {
     let registers = Bench::started(plan()).registers;
-    let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     registers.tim4.sr().write(|w| w.set_idxif(true));
     encoder.angle();
     for late in [0, 1, 40, 1_000] {
@@ -52,7 +54,7 @@ fn the_angle_is_that_of_the_trigger_however_late_it_is_read() {
 #[test]
 fn an_index_just_after_the_trigger_makes_no_false_angle() {
     let registers = Bench::started(plan()).registers;
-    let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     let mut at = |captured: u16, index: bool| {
         registers.tim4.cnt().write(|w| w.set_cnt(captured));
         control_update(&registers);
@@ -69,24 +71,30 @@ fn an_index_just_after_the_trigger_makes_no_false_angle() {
     assert_eq!(at(1_005, false), (Some(1_005), true));
 }
 
-/// An angle that was found is an angle; what the index then shows to be wrong goes in small steps, in whichever sample its flag is seen.
+/// A machine of reluctance alone.
+static RELUCTANCE: Ratings = Ratings { magnet_flux_wb: 0.0, ..BUILT_IN.ratings };
+
+/// An angle that was found is an angle; what the index then shows to be wrong goes in small steps, in whichever sample its flag is seen. Half a turn stays, where
+/// the machine has no magnets.
 #[test]
 fn an_angle_that_was_found_mends_at_the_index() {
     const UNIT: i32 = 1 << 22;
-    for late in [false, true] {
+    let machines =
+        [(false, &BUILT_IN.ratings, 0), (true, &BUILT_IN.ratings, 0), (true, &RELUCTANCE, i32::MIN)];
+    for (late, ratings, half) in machines {
         let registers = Bench::started(plan()).registers;
-        let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, ratings);
         let at = |encoder: &mut Encoder, captured: u16, index: bool| {
             registers.tim4.cnt().write(|w| w.set_cnt(captured));
             control_update(&registers);
             registers.tim4.sr().write(|w| w.set_idxif(index));
-            encoder.angle().map(|angle| angle.signed())
+            encoder.angle().map(|angle| angle.signed().wrapping_sub(half))
         };
         assert_eq!(at(&mut encoder, 100, false), None);
         assert_eq!(at(&mut encoder, 110, false), None);
         assert_eq!(encoder.counted(), Some(Angle(110 << 22)));
         // The index is 30 counts ahead; the angle was found 10 counts too far.
-        encoder.align(Angle((-130 * UNIT) as u32));
+        encoder.align(Angle((-130 * UNIT).wrapping_add(half) as u32));
         assert_eq!(encoder.counted(), None);
         assert_eq!(at(&mut encoder, 120, false), Some(-10 * UNIT));
         assert_eq!(at(&mut encoder, 130, false), Some(0));
@@ -109,7 +117,8 @@ fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
     let mut bench = Bench::started(plan());
     let registers = bench.registers;
     let state = PositionState::new();
-    let mut control = Control::new(registers, ZEROS, Encoder::new(registers.tim4, &POWER_STAGE, 4), &state);
+    let mut control =
+        Control::new(registers, ZEROS, Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings), &state);
     (bench.codes[2], bench.codes[15], bench.codes[5], bench.codes[6]) =
         (2_048 + 512, 2_050 - 256, 2_040 - 256, 2_457);
     bench.finish_sequence(registers.adc1);
@@ -133,7 +142,7 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
         let mut bench = Bench::started(plan());
         let registers = bench.registers;
         let state = PositionState::new();
-        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
         let mut control = Control::new(registers, ZEROS, encoder, &state);
         registers.tim4.sr().write(|w| w.set_idxif(index));
         control.sample(NOW);
@@ -175,7 +184,7 @@ fn the_first_samples_are_right_however_long_the_start_takes() {
     bench.microseconds(100);
     bench.finish_sequence(registers.adc1);
     let state = PositionState::new();
-    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     let currents = Control::new(registers, [AdcCode(2_048); 3], encoder, &state).sample(NOW).currents_a;
     assert_eq!((currents.a, currents.b, currents.c), (0.0, 0.0, 0.0));
 }
@@ -195,7 +204,7 @@ fn a_converter_that_is_silent_gives_no_number() {
 fn the_control_interrupt_is_acknowledged_and_no_other_flag() {
     let registers = Bench::started(plan()).registers;
     let state = PositionState::new();
-    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     registers.tim3.sr().write_value(SrGp16(0));
     Control::new(registers, ZEROS, encoder, &state).begin(false);
     assert_eq!(registers.tim3.sr().read().0, !1);
@@ -206,7 +215,7 @@ fn the_control_interrupt_is_acknowledged_and_no_other_flag() {
 fn the_drive_is_told_what_is_counted_and_tells_where_the_count_began() {
     let registers = Bench::started(plan()).registers;
     let state = PositionState::new();
-    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     let mut control = Control::new(registers, ZEROS, encoder, &state);
     registers.tim4.cnt().write(|w| w.set_cnt(110));
     control_update(&registers);
@@ -236,7 +245,7 @@ fn an_overrun_is_counted_from_the_next_period() {
     let bench = Bench::started(plan());
     let registers = bench.registers;
     let state = PositionState::new();
-    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+    let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     let mut control = Control::new(registers, ZEROS, encoder, &state);
     registers.tim3.sr().write(|_| ());
     registers.tim3.cnt().write(|w| w.set_cnt(77));
@@ -302,7 +311,7 @@ fn an_index_must_find_the_count_where_it_is_expected() {
         (20, 12, true),
     ] {
         let registers = Bench::started(plan()).registers;
-        let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
         registers.tim4.sr().write(|_| ());
         assert_eq!(encoder.angle(), None, "no index yet");
         registers.tim4.sr().write(|w| w.set_idxif(true));
@@ -354,7 +363,7 @@ fn what_holds_the_gates_has_a_name() {
         let bench = Bench::started(plan());
         let registers = bench.registers;
         let state = PositionState::new();
-        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, 4);
+        let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
         let mut control = Control::new(registers, ZEROS, encoder, &state);
         write_input(registers.gpiob, u32::from(ready) << 12);
         write_input(registers.gpioa, u32::from(ready) << 6);

@@ -4,6 +4,7 @@ use crate::bench::Bench;
 use crate::plan;
 use crate::ports::write_input;
 use nucleo_g474re::Control;
+use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::position::{Absolute, Position, PositionState, Resolver, decoded};
 use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use nucleo_g474re::registers::Registers;
@@ -23,7 +24,7 @@ fn prepared<P: Position>() -> (Bench, P) {
     let registers = bench.registers;
     P::prepare(&registers, &POWER_STAGE, &mut bench).unwrap();
     P::follow(&registers, &mut bench);
-    (bench, P::of(&registers, &POWER_STAGE, 4))
+    (bench, P::of(&registers, &POWER_STAGE, &BUILT_IN.ratings))
 }
 
 /// SPI1 has received these words, the same each.

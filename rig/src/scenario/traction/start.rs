@@ -64,7 +64,7 @@ impl Scenario<Traction> for Start {
             ..LinePlan::new(DcLinkSettings { source, ..link }, Box::new(|t_s| request(t_s, ratings)))
         };
         let plan = Plan::operated(DURATION_S, Vec::new(), line);
-        let encoder = Encoder::new(parameters.pole_pairs, self.from_deg / 360.0);
+        let encoder = Encoder::new(ratings, self.from_deg / 360.0);
         let inertia_kg_m2 = parameters.rotor_inertia_kg_m2;
         let free = SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 };
         Plan { speed: if self.braked { plan.speed } else { free }, encoder: Some(encoder), ..plan }

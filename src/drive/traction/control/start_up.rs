@@ -1,6 +1,7 @@
 //! The start of a drive whose position sensor only counts: the pulses of [`StartUp`] in the place of the control law's.
 
 use super::super::Shared;
+use super::super::applied::passed;
 use super::ControlTask;
 use crate::control::ControlLaw;
 use crate::frames::{AlphaBeta, six_step_v};
@@ -51,11 +52,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             && starting.boundary != Some(newest.at)
         {
             if let Some(currents_a) = self.pulses.currents_a(&shared.loaded) {
-                let ended = self.pulses.before(2);
-                let volt_seconds = || ended.volt_ticks * (sample.udc_v * clock.tick_s);
-                starting
-                    .law
-                    .observe(self.zeros.without(currents_a).clarke(), (!ended.is_off()).then(volt_seconds));
+                let ended = passed(&self.pulses, starting.boundary, (sample.udc_v, 0), &clock);
+                starting.law.observe(self.zeros.without(currents_a).clarke(), ended.volt_seconds);
             }
             starting.boundary = Some(newest.at);
         }
@@ -65,8 +63,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
             let limit_v = USED_SHARE * index_limit(Mode::Async, 0.0, devices) * six_step_v(sample.udc_v);
             let interval_s = if shortest_s < clock.control_s() { clock.control_s() } else { shortest_s };
-            let ratings = &self.machine.tables().ratings;
-            match starting.law.step(&StartUpInput { turned, limit_v, interval_s, ratings }) {
+            let tables = self.machine.tables();
+            let committed = self.pulses.committed_volt_ticks() * (sample.udc_v * clock.tick_s);
+            match starting.law.step(&StartUpInput { turned, limit_v, interval_s, committed, tables }) {
                 StartUpStep::Wait => return false,
                 StartUpStep::Pulse(wanted) => vector = wanted,
                 StartUpStep::Found(zero) => {

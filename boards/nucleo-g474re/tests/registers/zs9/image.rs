@@ -101,11 +101,7 @@ impl Image {
         let bus = Bus::new(&TO_ZS9, &registers, &mut Bench::of_other_inverter());
         let position: &'static PositionState = Box::leak(Box::new(PositionState::new()));
         let encoder = |timer, encoder_zero| {
-            Encoder::new(
-                timer,
-                &PowerStage { encoder_zero, ..STAGE.common },
-                BUILT_IN.ratings.pole_pairs as u32,
-            )
+            Encoder::new(timer, &PowerStage { encoder_zero, ..STAGE.common }, &BUILT_IN.ratings)
         };
         let [first, second] = zeros;
         let encoders = [encoder(registers.tim4, first), encoder(registers.tim3, second)];

@@ -2,6 +2,7 @@
 
 use super::model::Model;
 use crate::bench::{Bench, control_update};
+use nucleo_g474re::built_in::zs9::BUILT_IN;
 use nucleo_g474re::outputs::SoftwareBreak;
 use nucleo_g474re::position::{Encoder, PositionState};
 use nucleo_g474re::power_stage::AdcCode;
@@ -29,7 +30,8 @@ pub fn zeros() -> Zeros {
 }
 
 pub fn control<'a>(registers: Registers, state: &'a PositionState) -> Control<'a, Encoder> {
-    let encoders = [registers.tim4, registers.tim3].map(|timer| Encoder::new(timer, &STAGE.common, 4));
+    let encoders =
+        [registers.tim4, registers.tim3].map(|timer| Encoder::new(timer, &STAGE.common, &BUILT_IN.ratings));
     Control::new(registers, zeros(), encoders, state)
 }
 
