@@ -263,6 +263,10 @@ fn wires_of_the_current_sensors_are_told() {
             "{name}"
         );
     });
+    // A board's bus tells ten times a second what goes on: a first part of 20 kHz is over before.
+    let machine = Machine::load("pmsm-48v-1kw").unwrap();
+    let ended = identified(&parsed("--over-protocol --current-sensors=v,u,w"), &machine).unwrap().err();
+    assert_eq!(ended.and_then(|ended| ended.wiring).unwrap().to_string(), "v,u,w");
 }
 
 #[test]

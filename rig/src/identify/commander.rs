@@ -69,8 +69,10 @@ pub struct Commander {
     since: u64,
     /// The drive's newest word of the experiment.
     told: ExperimentFrame,
-    /// The experiment has been seen under way.
+    /// The experiment has been seen under way; and its frames since that say that it is over, with something observed: one that ends with its first pulses may
+    /// go by between two frames.
     went: bool,
+    over: u32,
     words: Vec<[Option<u32>; PACKED_WORDS]>,
     gathered: usize,
     ended: Option<Ended>,
@@ -79,6 +81,8 @@ pub struct Commander {
     pub frames: String,
 }
 
+/// Frames of an experiment that is over: the first may be of one before.
+const OVER_FRAMES: u32 = 2;
 /// Slots in a second.
 const SLOTS_S: u64 = 1_000;
 /// Slots for which the fault's value and limit are still waited for.
@@ -98,6 +102,7 @@ impl Commander {
             since: 0,
             told: ExperimentFrame { stage: Stage::Done, observations: 0 },
             went: false,
+            over: 0,
             words: Vec::new(),
             gathered: 0,
             ended: None,
@@ -129,7 +134,10 @@ impl Commander {
         if message.id == EXPERIMENT.id {
             if let Some(told) = ExperimentFrame::decode(payload) {
                 self.told = told;
-                self.went |= self.phase == Phase::Experiment && told.stage != Stage::Done;
+                if self.phase == Phase::Experiment {
+                    self.went |= told.stage != Stage::Done;
+                    self.over += u32::from(told.stage == Stage::Done && told.observations > 0);
+                }
             }
         } else if message.id == OBSERVATION.id && self.phase == Phase::Gather {
             let found = ObservationFrame::decode(payload);
@@ -162,7 +170,9 @@ impl Commander {
                     self.enter(Phase::Experiment);
                 }
             }
-            Phase::Experiment if self.went && self.told.stage == Stage::Done => {
+            Phase::Experiment
+                if self.told.stage == Stage::Done && (self.went || self.over >= OVER_FRAMES) =>
+            {
                 levels.enable = false;
                 self.words = vec![[None; PACKED_WORDS]; self.told.observations.into()];
                 self.enter(Phase::Stop);
