@@ -15,7 +15,7 @@
 #![forbid(unsafe_code)]
 
 use crate::frames::{AlphaBeta, Angle, SinCos, sqrt};
-use crate::machine::Tables;
+use crate::machine::{Ratings, Tables};
 
 /// Time for which the rotor has to stand still, in s, and what counts as still, electrical: 1°.
 const STILL_S: f32 = 0.1;
@@ -111,13 +111,12 @@ pub struct StartUp {
     /// Current at the last boundary, in A; and the volt-seconds of all halves until then, in V·s.
     before: AlphaBeta,
     flux: AlphaBeta,
-    /// Sums over the boundaries with a flux linkage: `Δi Δψ`, `Δψ Δψ`, `Δi·Δψ`, `Δψ²`, currents and flux linkages of the pulses; and how many they are.
+    /// Sums over the boundaries with a flux linkage: `Δi Δψ`, `Δψ Δψ`, `Δi·Δψ`, `Δψ²`, the currents of the pulses; and how many they are.
     salient: AlphaBeta,
     uneven: AlphaBeta,
     round: f32,
     squared: f32,
     polar: AlphaBeta,
-    pulsed: AlphaBeta,
     count: f32,
     /// Electrical angle of the axis where `from` is.
     axis: Angle,
@@ -148,7 +147,6 @@ impl StartUp {
             round: 0.0,
             squared: 0.0,
             polar: NONE,
-            pulsed: NONE,
             count: 0.0,
             axis: Angle::ZERO,
         }
@@ -171,11 +169,9 @@ impl StartUp {
         self.squared += flux.squared();
         let built = twice.dot(flux);
         if built > 0.0 {
-            (self.polar, self.pulsed, self.count) =
-                (self.polar + change, self.pulsed + flux, self.count + 1.0);
+            (self.polar, self.count) = (self.polar + change, self.count + 1.0);
         } else if built < 0.0 {
-            (self.polar, self.pulsed, self.count) =
-                (self.polar - change, self.pulsed - flux, self.count + 1.0);
+            (self.polar, self.count) = (self.polar - change, self.count + 1.0);
         }
     }
 
@@ -253,9 +249,7 @@ impl StartUp {
         if !has_magnets {
             return Some(self.found(false));
         }
-        let mirrored = AlphaBeta { beta: -self.pulsed.beta, ..self.pulsed };
-        let polar = self.polar - self.pulsed * a - times(b, mirrored);
-        let polar_a = polar.park(self.axis.sin_cos()).d;
+        let polar_a = self.polar.park(self.axis.sin_cos()).d;
         // The currents' way is the sum of `Δi·Δψ` over the flux linkages' mean.
         let way = POLAR_SHARE * self.round;
         if polar_a * polar_a * self.squared > way * way * self.count {
@@ -321,13 +315,19 @@ impl Default for StartUp {
     }
 }
 
+/// The error of a rotor's angle that matters: of a machine without magnets not the half turn in it.
+pub const fn axis_error(ratings: &Ratings, error: Angle) -> Angle {
+    if ratings.has_magnets() { error } else { Angle(((error.0 << 1) as i32 >> 1) as u32) }
+}
+
 /// Commands that build a pulse up, and its flux linkage in Wb.
 fn pulse(input: &StartUpInput) -> (u32, f32) {
     let ratings = &input.tables.ratings;
     let pulse_wb = if ratings.has_magnets() {
         PULSE_SHARE * ratings.magnet_flux_wb
     } else {
-        -input.tables.flux.at(-PULSE_SHARE * ratings.max_current_a, 0.0)[0]
+        let at = |id_a: f32| input.tables.flux.at(id_a, 0.0)[0];
+        at(0.0) - at(-PULSE_SHARE * ratings.max_current_a)
     };
     let most_wb = input.limit_v * input.interval_s;
     let share = pulse_wb / most_wb;

@@ -143,7 +143,7 @@ pub trait ControlPort<S: System = Traction> {
         None
     }
     /// The electrical angle that the rotor had where the counting began: from the next sample on the sensor has an angle, until
-    /// an index knows better. Of a machine without magnets it may be half a turn off, which an index has to leave: [`Ratings::axis_error`].
+    /// an index knows better. Of a machine without magnets it may be half a turn off, which an index has to leave: [`axis_error`](crate::start_up::axis_error).
     fn align(&mut self, _now: Instant, _zero: Angle) {}
 }
 

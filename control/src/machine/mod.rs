@@ -14,8 +14,6 @@ mod lookup;
 pub use iron_loss::IronLoss;
 pub use lookup::{Curve, Grid};
 
-use crate::frames::Angle;
-
 /// Scalars of a machine folder. SI units, peak values of phase quantities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -72,11 +70,6 @@ impl Ratings {
     pub const fn has_magnets(&self) -> bool {
         // Less is the tables' rounding.
         self.magnet_flux_wb > 1e-9
-    }
-
-    /// The error of a rotor's angle that matters: without magnets not the half turn in it.
-    pub const fn axis_error(&self, error: Angle) -> Angle {
-        if self.has_magnets() { error } else { Angle(((error.0 << 1) as i32 >> 1) as u32) }
     }
 
     /// A direct-axis current, in A, no lower than the demagnetisation limit.

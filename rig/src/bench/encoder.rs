@@ -2,6 +2,7 @@
 
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
+use tractive::start_up::axis_error;
 
 /// Share of what an index has shown to be wrong that is left after each sample, as a number of bits: the angle mends in some
 /// hundreds of samples, and nobody sees a step.
@@ -48,7 +49,7 @@ impl Encoder {
     /// for half a turn.
     pub fn align(&mut self, zero: Angle) -> f64 {
         self.zero = self.zero.or(Some(zero));
-        f64::from(self.ratings.axis_error(zero - self.first).signed()) / 4_294_967_296.0 * 360.0
+        f64::from(axis_error(self.ratings, zero - self.first).signed()) / 4_294_967_296.0 * 360.0
     }
 
     /// The reading where the rotor has this angle.
@@ -63,7 +64,7 @@ impl Encoder {
         let counted = angle - self.first;
         if self.indexed {
             let zero = self.zero.get_or_insert(self.first);
-            let left = self.ratings.axis_error(*zero - self.first).signed();
+            let left = axis_error(self.ratings, *zero - self.first).signed();
             *zero = Angle((zero.signed().wrapping_sub(left >> MENDING_BITS)) as u32);
         }
         let angle = self.zero.map(|zero| zero + counted);

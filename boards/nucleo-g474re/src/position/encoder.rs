@@ -12,6 +12,7 @@ use crate::start::{StartError, Wait};
 use stm32_metapac::timer::{TimGp16, regs, vals};
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
+use tractive::start_up::axis_error;
 
 /// An incremental encoder with an index, counted by TIM4.
 #[derive(Clone, Copy)]
@@ -131,7 +132,7 @@ impl Position for Encoder {
             None => {
                 if let Some(found) = self.found {
                     let error = self.counted + self.moved + found - (turned + self.zero);
-                    self.left = self.ratings.axis_error(error);
+                    self.left = axis_error(self.ratings, error);
                     self.zero = self.zero + error - self.left;
                 }
                 Some((count, 0))

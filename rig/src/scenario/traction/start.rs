@@ -34,6 +34,8 @@ const ENABLE_S: f64 = 0.3;
 const TORQUE: [(f64, f64); 2] = [(0.8, 0.2), (1.1, 0.0)];
 /// The torque is judged.
 const JUDGED_S: (f64, f64) = (0.95, 1.09);
+/// The time that torque takes from an angle that is found later on.
+const COMES_S: f64 = 0.05;
 const DURATION_S: f64 = 1.2;
 
 fn request(t_s: f64, ratings: &Ratings) -> Request {
@@ -73,9 +75,11 @@ impl Scenario<Traction> for Start {
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let wanted_nm = TORQUE[0].1 * machine.folder.parameters.max_torque_nm;
-        let judged = analysis::window(recording, JUDGED_S.0, JUDGED_S.1);
-        let torque_error = (mean(judged, |row| row.te_nm) / wanted_nm - 1.0).abs();
         let found = recording.found;
+        // Torque that waits for the angle is judged once it has come.
+        let begin_s = found.map_or(JUDGED_S.0, |found| JUDGED_S.0.max(found.t_s + COMES_S));
+        let judged = analysis::window(recording, begin_s, JUDGED_S.1);
+        let torque_error = (mean(judged, |row| row.te_nm) / wanted_nm - 1.0).abs();
         let (error_deg, backward_deg) = (found.map(|found| found.error_deg), backward_deg(recording));
         figures.set("angle_found_after_s", found.map(|found| found.t_s - ENABLE_S));
         figures.set("angle_error_deg", error_deg);

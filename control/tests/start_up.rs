@@ -1,0 +1,133 @@
+//! The angle of a rotor that stands, from pulses of halves that are no whole number to a command: its axis, its poles, and none where there are none.
+
+use std::path::Path;
+use std::sync::OnceLock;
+use tractive_control::frames::{AlphaBeta, Angle, Dq};
+use tractive_control::machine::{Ratings, Tables};
+use tractive_control::start_up::{PULSE_SHARE, StartUp, StartUpInput, StartUpStep, axis_error};
+use tractive_tablegen::MachineFolder;
+
+/// Halves that commands act for: control has five periods for eight of them.
+const HALVES: [f32; 5] = [1.0, 2.0, 1.0, 2.0, 2.0];
+const HALF_S: f32 = 50e-6;
+
+/// A rotor that stands.
+struct Rotor {
+    at: Angle,
+    inductance_h: Dq,
+    /// Growth of the current along +d over its flux linkage, per Wb: magnets saturate the iron there.
+    bend: f32,
+}
+
+impl Rotor {
+    fn current(&self, flux: AlphaBeta) -> AlphaBeta {
+        let flux = flux.park(self.at.sin_cos());
+        let Dq { d, q } = self.inductance_h;
+        Dq { d: flux.d / d * (1.0 + self.bend * flux.d), q: flux.q / q }.unpark(self.at.sin_cos())
+    }
+}
+
+/// The reference machine's tables, with magnets or as those of reluctance alone.
+fn tables(magnets: bool) -> Tables {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");
+    static MADE: OnceLock<Tables> = OnceLock::new();
+    let tables = MADE.get_or_init(|| MachineFolder::read(&folder).unwrap().tables());
+    let ratings = Ratings { magnet_flux_wb: if magnets { 0.2 } else { 0.0 }, ..tables.ratings };
+    Tables { ratings, ..*tables }
+}
+
+/// The law's answer, and the largest flux linkage of its pulses, in Wb.
+fn answer(rotor: &Rotor, tables: &Tables) -> (StartUpStep, f32) {
+    let (mut law, mut flux, mut largest_wb) = (StartUp::new(), AlphaBeta::default(), 0.0_f32);
+    law.wait(Angle::ZERO, 0.2);
+    for command in 0..10_000 {
+        let input = StartUpInput {
+            turned: Angle::ZERO,
+            limit_v: 800.0,
+            interval_s: 1.6 * HALF_S,
+            committed: AlphaBeta::default(),
+            tables,
+        };
+        let step = law.step(&input);
+        let StartUpStep::Pulse(voltage) = step else { return (step, largest_wb) };
+        let acted = voltage * (HALVES[command % HALVES.len()] * HALF_S);
+        flux = flux + acted;
+        largest_wb = largest_wb.max(flux.squared().sqrt());
+        law.observe(rotor.current(flux), Some(acted));
+    }
+    panic!("no answer");
+}
+
+/// The angle that was found, off the rotor's, in electrical degrees.
+fn off_deg(step: StartUpStep, rotor: &Rotor) -> f32 {
+    let StartUpStep::Found(found) = step else { panic!("{step:?}") };
+    (found - rotor.at).signed_radians().to_degrees()
+}
+
+const SALIENT: Dq = Dq { d: 2e-3, q: 5e-3 };
+const DEGREES: [f32; 5] = [0.0, 50.0, 123.0, 200.0, 311.0];
+
+fn rotors(inductance_h: Dq, bend: f32) -> impl Iterator<Item = Rotor> {
+    DEGREES.into_iter().map(move |degrees| Rotor {
+        at: Angle::from_radians(degrees.to_radians()),
+        inductance_h,
+        bend,
+    })
+}
+
+/// Each command makes up for what the halves before it have made of theirs: no pulse is longer than the longest command makes one, and saturation shows the poles.
+#[test]
+fn saturation_shows_the_poles_though_pulses_are_of_unequal_length() {
+    let tables = tables(true);
+    for rotor in rotors(SALIENT, 2.0) {
+        let (step, largest_wb) = answer(&rotor, &tables);
+        assert!(off_deg(step, &rotor).abs() < 1.0, "{step:?}");
+        let pulse_wb = PULSE_SHARE * tables.ratings.magnet_flux_wb;
+        assert!((1.2..1.7).contains(&(largest_wb / pulse_wb)), "{}", largest_wb / pulse_wb);
+    }
+}
+
+/// Iron that saturates alike on both sides shows none: the rotor has to be pushed, and one that does not move has failed.
+#[test]
+fn iron_without_poles_shows_none_and_a_rotor_that_is_held_has_failed() {
+    let tables = tables(true);
+    for rotor in rotors(SALIENT, 0.0) {
+        assert_eq!(answer(&rotor, &tables).0, StartUpStep::Failed);
+    }
+}
+
+/// A machine of reluctance alone has an axis and no poles, and its pulses have the flux linkage of a current.
+#[test]
+fn a_machine_of_reluctance_alone_is_found_but_for_half_a_turn() {
+    let tables = tables(false);
+    for rotor in rotors(SALIENT, 0.0) {
+        let (step, largest_wb) = answer(&rotor, &tables);
+        let StartUpStep::Found(found) = step else { panic!("{step:?}") };
+        let error = axis_error(&tables.ratings, found - rotor.at);
+        assert!(error.signed_radians().to_degrees().abs() < 0.1, "{error:?}");
+        let at = |id_a: f32| tables.flux.at(id_a, 0.0)[0];
+        let pulse_wb = at(0.0) - at(-PULSE_SHARE * tables.ratings.max_current_a);
+        assert!((1.2..1.7).contains(&(largest_wb / pulse_wb)), "{}", largest_wb / pulse_wb);
+    }
+}
+
+/// Pulses of unequal lengths alone look like an axis, along the longer ones.
+#[test]
+fn a_machine_without_saliency_has_no_axis() {
+    for rotor in rotors(Dq { d: 3e-3, q: 3e-3 }, 0.0) {
+        assert_eq!(answer(&rotor, &tables(true)).0, StartUpStep::Failed);
+    }
+}
+
+/// Half a turn is no error of a machine without magnets, and all of one of a machine with them.
+#[test]
+fn half_a_turn_is_an_error_of_magnets_alone() {
+    let [with, without] = [true, false].map(|magnets| tables(magnets).ratings);
+    assert!(with.has_magnets() && !without.has_magnets());
+    for units in [0, 1, -1, 1 << 20, -(1 << 29)] {
+        let error = Angle(units as u32);
+        assert_eq!((axis_error(&with, error), axis_error(&without, error)), (error, error));
+        let turned = Angle((units as u32) ^ 1 << 31);
+        assert_eq!((axis_error(&with, turned), axis_error(&without, turned)), (turned, error));
+    }
+}
