@@ -111,12 +111,13 @@ pub struct StartUp {
     /// Current at the last boundary, in A; and the volt-seconds of all halves until then, in V·s.
     before: AlphaBeta,
     flux: AlphaBeta,
-    /// Sums over the boundaries with a flux linkage: `Δi Δψ`, `Δψ Δψ`, `Δi·Δψ`, `Δψ²`, the currents of the pulses; and how many they are.
+    /// Sums over the boundaries with a flux linkage: `Δi Δψ`, `Δψ Δψ`, `Δi·Δψ`, `Δψ²`, currents and flux linkages of the pulses; and how many they are.
     salient: AlphaBeta,
     uneven: AlphaBeta,
     round: f32,
     squared: f32,
     polar: AlphaBeta,
+    pulsed: AlphaBeta,
     count: f32,
     /// Electrical angle of the axis where `from` is.
     axis: Angle,
@@ -147,6 +148,7 @@ impl StartUp {
             round: 0.0,
             squared: 0.0,
             polar: NONE,
+            pulsed: NONE,
             count: 0.0,
             axis: Angle::ZERO,
         }
@@ -169,9 +171,11 @@ impl StartUp {
         self.squared += flux.squared();
         let built = twice.dot(flux);
         if built > 0.0 {
-            (self.polar, self.count) = (self.polar + change, self.count + 1.0);
+            (self.polar, self.pulsed, self.count) =
+                (self.polar + change, self.pulsed + flux, self.count + 1.0);
         } else if built < 0.0 {
-            (self.polar, self.count) = (self.polar - change, self.count + 1.0);
+            (self.polar, self.pulsed, self.count) =
+                (self.polar - change, self.pulsed - flux, self.count + 1.0);
         }
     }
 
@@ -249,7 +253,10 @@ impl StartUp {
         if !has_magnets {
             return Some(self.found(false));
         }
-        let polar_a = self.polar.park(self.axis.sin_cos()).d;
+        // Less what pulses that are longer one way than the other leave by themselves.
+        let mirrored = AlphaBeta { beta: -self.pulsed.beta, ..self.pulsed };
+        let polar = self.polar - self.pulsed * a - times(b, mirrored);
+        let polar_a = polar.park(self.axis.sin_cos()).d;
         // The currents' way is the sum of `Δi·Δψ` over the flux linkages' mean.
         let way = POLAR_SHARE * self.round;
         if polar_a * polar_a * self.squared > way * way * self.count {
