@@ -7,11 +7,16 @@ use tractive_control::machine::{Ratings, Tables};
 use tractive_control::start_up::{PULSE_SHARE, StartUp, StartUpInput, StartUpStep, axis_error};
 use tractive_tablegen::MachineFolder;
 
-/// Halves that commands act for: control has five periods for eight of them.
-const HALVES: [f32; 5] = [1.0, 2.0, 1.0, 2.0, 2.0];
 const HALF_S: f32 = 50e-6;
 
+/// Commands after which a command has two halves and not one, or one and not two: of pulses of three commands, in twelve directions of four pulses, every other
+/// command; those of every other quarter turn, so that the longer ones have an axis; those of every other half turn, so that they have a side.
+const MIXED: usize = 1;
+const BY_AXIS: usize = 36;
+const BY_SIDE: usize = 72;
+
 /// A rotor that stands.
+#[derive(Clone, Copy)]
 struct Rotor {
     at: Angle,
     inductance_h: Dq,
@@ -36,21 +41,22 @@ fn tables(magnets: bool) -> Tables {
     Tables { ratings, ..*tables }
 }
 
-/// The law's answer, and the largest flux linkage of its pulses, in Wb.
-fn answer(rotor: &Rotor, tables: &Tables) -> (StartUpStep, f32) {
+/// The law's answer, the largest flux linkage of its pulses, in Wb, and whether it has pushed the rotor: its pulses alone take some three hundred commands.
+fn answer(rotor: &Rotor, tables: &Tables, alike: usize) -> (StartUpStep, f32, bool) {
     let (mut law, mut flux, mut largest_wb) = (StartUp::new(), AlphaBeta::default(), 0.0_f32);
     law.wait(Angle::ZERO, 0.2);
     for command in 0..10_000 {
         let input = StartUpInput {
             turned: Angle::ZERO,
             limit_v: 800.0,
-            interval_s: 1.6 * HALF_S,
+            interval_s: 1.5 * HALF_S,
             committed: AlphaBeta::default(),
             tables,
         };
         let step = law.step(&input);
-        let StartUpStep::Pulse(voltage) = step else { return (step, largest_wb) };
-        let acted = voltage * (HALVES[command % HALVES.len()] * HALF_S);
+        let StartUpStep::Pulse(voltage) = step else { return (step, largest_wb, command > 400) };
+        let halves = 1 + command / alike % 2;
+        let acted = voltage * (halves as f32 * HALF_S);
         flux = flux + acted;
         largest_wb = largest_wb.max(flux.squared().sqrt());
         law.observe(rotor.current(flux), Some(acted));
@@ -65,6 +71,8 @@ fn off_deg(step: StartUpStep, rotor: &Rotor) -> f32 {
 }
 
 const SALIENT: Dq = Dq { d: 2e-3, q: 5e-3 };
+const ROUND: Dq = Dq { d: 3e-3, q: 3e-3 };
+const EVERY: [usize; 3] = [MIXED, BY_AXIS, BY_SIDE];
 const DEGREES: [f32; 5] = [0.0, 50.0, 123.0, 200.0, 311.0];
 
 fn rotors(inductance_h: Dq, bend: f32) -> impl Iterator<Item = Rotor> {
@@ -79,8 +87,8 @@ fn rotors(inductance_h: Dq, bend: f32) -> impl Iterator<Item = Rotor> {
 #[test]
 fn saturation_shows_the_poles_though_pulses_are_of_unequal_length() {
     let tables = tables(true);
-    for rotor in rotors(SALIENT, 2.0) {
-        let (step, largest_wb) = answer(&rotor, &tables);
+    for (rotor, alike) in rotors(SALIENT, 2.0).flat_map(|rotor| EVERY.map(|alike| (rotor, alike))) {
+        let (step, largest_wb, _) = answer(&rotor, &tables, alike);
         assert!(off_deg(step, &rotor).abs() < 1.0, "{step:?}");
         let pulse_wb = PULSE_SHARE * tables.ratings.magnet_flux_wb;
         assert!((1.2..1.7).contains(&(largest_wb / pulse_wb)), "{}", largest_wb / pulse_wb);
@@ -91,8 +99,9 @@ fn saturation_shows_the_poles_though_pulses_are_of_unequal_length() {
 #[test]
 fn iron_without_poles_shows_none_and_a_rotor_that_is_held_has_failed() {
     let tables = tables(true);
-    for rotor in rotors(SALIENT, 0.0) {
-        assert_eq!(answer(&rotor, &tables).0, StartUpStep::Failed);
+    for (rotor, alike) in rotors(SALIENT, 0.0).flat_map(|rotor| EVERY.map(|alike| (rotor, alike))) {
+        let (step, _, pushed) = answer(&rotor, &tables, alike);
+        assert_eq!((step, pushed), (StartUpStep::Failed, true), "{alike}");
     }
 }
 
@@ -100,8 +109,8 @@ fn iron_without_poles_shows_none_and_a_rotor_that_is_held_has_failed() {
 #[test]
 fn a_machine_of_reluctance_alone_is_found_but_for_half_a_turn() {
     let tables = tables(false);
-    for rotor in rotors(SALIENT, 0.0) {
-        let (step, largest_wb) = answer(&rotor, &tables);
+    for (rotor, alike) in rotors(SALIENT, 0.0).flat_map(|rotor| EVERY.map(|alike| (rotor, alike))) {
+        let (step, largest_wb, _) = answer(&rotor, &tables, alike);
         let StartUpStep::Found(found) = step else { panic!("{step:?}") };
         let error = axis_error(&tables.ratings, found - rotor.at);
         assert!(error.signed_radians().to_degrees().abs() < 0.1, "{error:?}");
@@ -114,8 +123,10 @@ fn a_machine_of_reluctance_alone_is_found_but_for_half_a_turn() {
 /// Pulses of unequal lengths alone look like an axis, along the longer ones.
 #[test]
 fn a_machine_without_saliency_has_no_axis() {
-    for rotor in rotors(Dq { d: 3e-3, q: 3e-3 }, 0.0) {
-        assert_eq!(answer(&rotor, &tables(true)).0, StartUpStep::Failed);
+    let tables = tables(true);
+    for (rotor, alike) in rotors(ROUND, 0.0).flat_map(|rotor| EVERY.map(|alike| (rotor, alike))) {
+        let (step, _, pushed) = answer(&rotor, &tables, alike);
+        assert_eq!((step, pushed), (StartUpStep::Failed, false), "{alike}");
     }
 }
 

@@ -256,7 +256,7 @@ fn largest_phase_a([alpha, beta]: [f64; 2]) -> f64 {
     [alpha, half_beta - 0.5 * alpha, -half_beta - 0.5 * alpha].map(f64::abs).into_iter().fold(0.0, f64::max)
 }
 
-/// Errors of the flux linkage within the circle, as shares of the largest there: root mean square, worst.
+/// Errors of the flux linkage within the circle and above the demagnetisation limit, as shares of the largest there: root mean square, worst.
 fn flux_errors(fit: &Fit, truth: &Truth, machine: &Machine) -> (f64, f64) {
     let parameters = &machine.folder.parameters;
     let bound_a = parameters.max_current_a;

@@ -33,7 +33,7 @@ pub trait Position: Sized {
     /// Begins once the timers run: what they trigger.
     fn follow(_registers: &Registers, _wait: &mut dyn Wait) {}
 
-    /// The sensor on the shaft of a machine with this many pole pairs.
+    /// The sensor on the shaft of a machine of these ratings.
     fn of(registers: &Registers, stage: &PowerStage, ratings: &'static Ratings) -> Self;
 
     /// The angle at the control timer's update; `None` while it is not known, which keeps the gates off. Called in the control interrupt: it may not wait.
