@@ -72,6 +72,7 @@ pub fn keep_named(places: &Places, named: &BTreeMap<String, String>) -> Result<(
 
 /// Tries them all.
 pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
+    let known = KnownList::read(&places.root.join("mutants/known.toml"), &tree.mutants)?;
     let copy = places.work.join("tree");
     tree::copy(&places.root, &copy, tree)?;
     let mut left_out = left_out(places, tree);
@@ -88,7 +89,6 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build_global()?;
     let trials = learnt(places, &programs, options)?;
     let results = Results::open(&shards::file(places, options), Head::new(places, tree, options).as_ref())?;
-    let known = KnownList::read(&places.root.join("mutants/known.toml"), &tree.mutants)?;
     let (fixed, mut open): (Vec<&Mutant>, Vec<&Mutant>) = chosen(&tree.mutants, options)
         .into_iter()
         .filter(|mutant| !left_out.contains_key(&mutant.number))

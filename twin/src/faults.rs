@@ -4,11 +4,12 @@
 use crate::chip::rcc::POWER_ON;
 use crate::core::cpu::{Cpu, Longest};
 use crate::core::nvic::HARD_FAULT;
+use crate::machine::What;
 use crate::run::{Settings, prepare};
 use crate::time::{MICROSECOND, MILLISECOND, Time};
 use crate::world::Edge;
 use anyhow::{Result, ensure};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use tractive::protocol::{Frame, Scales};
 use tractive_rig::talk::{Listener, System};
@@ -36,11 +37,18 @@ const EMPTY_TIME: Time = 47 * 2 * MICROSECOND;
 const AFTER: Time = 300 * MILLISECOND;
 const AFTER_STARTING: Time = 90 * MILLISECOND;
 
+/// The time in which any start has come to its end.
+const STARTED: Time = 25 * MILLISECOND;
+/// The least time between two first accesses.
+const APART: Time = 30 * MICROSECOND;
+/// The enable register of the bus of the timers with gates, an offset in RCC.
+const APB2ENR: u32 = 0x60;
+
 /// The state of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum When {
-    /// The start is under way: this many µs after the release of reset.
-    Starting(u32),
+    /// The start is under way: this long after the release of reset.
+    Starting(Time),
     /// Nothing commanded.
     Ready,
     /// The link is charged.
@@ -54,7 +62,7 @@ pub enum When {
 impl When {
     fn instant(self, system: System) -> Time {
         let ms = match (self, system) {
-            (Self::Starting(us), _) => return Time::from(us) * MICROSECOND,
+            (Self::Starting(at), _) => return at,
             (Self::Ready, _) => 190,
             (Self::Charged, System::Pmasynrm) => 480,
             (Self::Charged, System::Zs9) => 680,
@@ -118,6 +126,8 @@ pub struct Seen {
     pub lines_off_after: Option<Time>,
     /// Gates were on just before.
     pub pulsed: bool,
+    /// The timers had their clocks just before; without them pins float as from the reset on, and what switches off does nothing.
+    pub clocked: bool,
     /// Frames heard in the last third of the time.
     pub heard: u64,
     /// The resets.
@@ -136,18 +146,37 @@ pub struct Seen {
     pub findings: Vec<String>,
 }
 
+/// The instants of an undisturbed start at which a register is accessed for the first time, and those half-way between them, which lie in its
+/// waits. Accesses that are not [`APART`] are one.
+pub fn starting(image: &Path, system: System) -> Result<Vec<Time>> {
+    let mut cpu = drive(image, system)?;
+    cpu.machine_mut().record = Some(Vec::new());
+    cpu.run(STARTED)?;
+    let mut seen = HashSet::new();
+    let accesses = cpu.machine_mut().record.take().unwrap_or_default();
+    let first = accesses.into_iter().filter(|access| match access.what {
+        What::Read(address, _) | What::Write(address, _) => seen.insert(address),
+        What::Entry => false,
+    });
+    let mut instants = vec![0];
+    for access in first {
+        let before = instants.last().copied().unwrap_or_default();
+        if access.at >= before + APART {
+            instants.extend([before.midpoint(access.at), access.at]);
+        }
+    }
+    Ok(instants)
+}
+
 /// Drives the image into a state, lets the fault come, and looks.
 pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Seen> {
-    let script = match system {
-        System::Pmasynrm => SCRIPT,
-        System::Zs9 => SCRIPT_ZS9,
-    };
-    let (mut cpu, _) = prepare(&Settings::new(image, system, script.to_owned()))?;
+    let mut cpu = drive(image, system)?;
     cpu.machine_mut().world.side.charge();
     cpu.run(when.instant(system))?;
     let machine = cpu.machine();
     ensure!(machine.findings.all.is_empty(), "{}", machine.findings.all[0]);
     let (from, pulsed) = (machine.now(), machine.world.any_gate());
+    let clocked = machine.chip.rcc.word(APB2ENR) != 0;
     let before = [machine.world.edges.len(), machine.world.line_edges.len()];
     let after = if matches!(when, When::Starting(_)) { AFTER_STARTING } else { AFTER };
     let lost = machine.chip.can.lost;
@@ -168,6 +197,7 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
         off_after: (!world.any_gate()).then(|| last(&world.edges[gates..])),
         lines_off_after: (!world.any_line()).then(|| last(&world.line_edges[lines..])),
         pulsed,
+        clocked,
         heard: world.talk.received - received,
         resets: machine.resets,
         told: format!("{} {}", say("state"), say("fault")).trim().to_owned(),
@@ -177,6 +207,14 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
         lost: machine.chip.can.lost - lost,
         findings: machine.findings.all.iter().map(|finding| finding.text.clone()).collect(),
     })
+}
+
+fn drive(image: &Path, system: System) -> Result<Cpu> {
+    let script = match system {
+        System::Pmasynrm => SCRIPT,
+        System::Zs9 => SCRIPT_ZS9,
+    };
+    Ok(prepare(&Settings::new(image, system, script.to_owned()))?.0)
 }
 
 fn last_frames(log: &str) -> Vec<String> {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use tractive_rig::talk::System;
-use tractive_twin::faults::{Cause, Seen, When, look};
+use tractive_twin::faults::{Cause, Seen, When, look, starting};
 use tractive_twin::time::{MICROSECOND, Time};
 
 fn image(system: System) -> PathBuf {
@@ -11,18 +11,6 @@ fn image(system: System) -> PathBuf {
         System::Zs9 => "TRACTIVE_NUCLEO_ZS9_IMAGE",
     };
     std::env::var_os(name).expect(name).into()
-}
-
-/// Instants in the start, in µs: memory cleared, crystal, PLL, pins, timers, converters, zeros, gates' pins, breaks, watchdog, run; of either image,
-/// the ZS9's [later](later_us). The first one is that of the other faults.
-const STARTING_US: [u32; 14] =
-    [5_314, 1_000, 3_000, 4_400, 4_614, 4_619, 5_138, 5_142, 10_159, 10_514, 13_474, 14_214, 14_444, 17_714];
-/// The first instant at which peripherals have their clocks, in µs, likewise.
-const CLOCKED_US: u32 = 4_613;
-
-/// The time that the ZS9 needs to copy its interrupts' code before anything else, in µs.
-fn later_us(system: System) -> u32 {
-    if system == System::Zs9 { 4_259 } else { 0 }
 }
 
 /// The time within which every gate is off; `None` where the drive goes on.
@@ -111,9 +99,7 @@ fn campaign(system: System, cases: impl IntoIterator<Item = (Cause, When)>) {
         let off = is_within(within(cause), seen.off_after)
             && is_within(lines_within(cause, when), seen.lines_off_after);
         let pulsed = seen.pulsed == matches!(when, When::Enabled | When::Running);
-        // What switches off before anything has a clock does nothing: the pins float as from the reset on.
-        let clocked_us = CLOCKED_US + later_us(system);
-        let is_early = matches!(when, When::Starting(us) if us < clocked_us);
+        let is_early = matches!(when, When::Starting(_)) && !seen.clocked;
         let early = |text: &String| is_early && text.ends_with("its clock is off");
         let quiet = seen.findings.iter().all(early);
         if !(off && pulsed && quiet && told(system, cause, when, &seen)) {
@@ -140,9 +126,11 @@ fn elsewhere(system: System) {
     let causes = [Cause::HardFault, Cause::Hang, Cause::Debugger, Cause::BrownOut];
     let states = [When::Ready, When::Charged, When::Enabled];
     campaign(system, causes.into_iter().flat_map(|cause| states.map(|when| (cause, when))));
-    let later = |us: u32| When::Starting(us + later_us(system));
-    campaign(system, causes[1..].iter().map(|cause| (*cause, later(STARTING_US[0]))));
-    campaign(system, STARTING_US.map(|us| (Cause::HardFault, later(us))));
+    let starting: Vec<_> = starting(&image(system), system).unwrap().into_iter().map(When::Starting).collect();
+    assert!(starting.len() > 20, "{starting:?}");
+    let middle = starting[starting.len() / 2];
+    campaign(system, causes[1..].iter().map(|cause| (*cause, middle)));
+    campaign(system, starting.into_iter().map(|when| (Cause::HardFault, when)));
 }
 
 #[test]
