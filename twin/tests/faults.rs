@@ -126,7 +126,8 @@ fn elsewhere(system: System) {
     let causes = [Cause::HardFault, Cause::Hang, Cause::Debugger, Cause::BrownOut];
     let states = [When::Ready, When::Charged, When::Enabled];
     campaign(system, causes.into_iter().flat_map(|cause| states.map(|when| (cause, when))));
-    let starting: Vec<_> = starting(&image(system), system).unwrap().into_iter().map(When::Starting).collect();
+    let starting: Vec<_> =
+        starting(&image(system), system).unwrap().into_iter().map(When::Starting).collect();
     assert!(starting.len() > 20, "{starting:?}");
     let middle = starting[starting.len() / 2];
     campaign(system, causes[1..].iter().map(|cause| (*cause, middle)));
