@@ -99,7 +99,7 @@ pub(super) fn limits(
     ModeLimits {
         follows: follows(mode),
         index_limit,
-        steady_share: 1.0,
+        steady_share: exit.open(mode, index_limit, passed_s),
         filled,
         ripple_share: if aliases(mode, settings) { 0.0 } else { ripple_share(trimmed, modulation_index) },
         settled: exit.is_settled(decision),

@@ -186,7 +186,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             rate: clock.angle_rate(omega),
             at: now,
             udc_v,
-            modulation_index: self.modulation_index,
+            modulation_index: self.exit.opened(self.modulation_index),
         };
     }
 
