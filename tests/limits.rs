@@ -433,7 +433,7 @@ fn aimed_share(share: f32) -> f32 {
     let limits = ModeLimits {
         follows: Regulated::Mean,
         index_limit: 1.0,
-        steady_share: 1.0,
+        steady_limit: 1.0,
         filled: false,
         ripple_share: 0.05,
         settled: true,

@@ -70,7 +70,7 @@ impl Walk {
         let limits = ModeLimits {
             follows: Regulated::Mean,
             index_limit: 0.9,
-            steady_share: 0.95,
+            steady_limit: 0.9 * 0.95,
             filled: false,
             ripple_share: 0.05,
             settled: true,
@@ -105,7 +105,7 @@ impl Walk {
                 _ => Regulated::Angle,
             };
             self.limits.index_limit = random.within(0.7, 1.0);
-            self.limits.steady_share = random.within(0.9, 1.0);
+            self.limits.steady_limit = self.limits.index_limit * random.within(0.9, 1.0);
             self.limits.ripple_share = random.within(0.01, 0.2);
             (self.limits.filled, self.limits.settled) = (random.is(0.3), random.is(0.7));
         }

@@ -160,7 +160,7 @@ fn references_keep_the_limit_on_their_way_as_well() {
     let way = |follows, filled, settled| ModeLimits {
         follows,
         index_limit: 1.0,
-        steady_share: 1.0,
+        steady_limit: 1.0,
         filled,
         ripple_share: 0.05,
         settled,
@@ -195,7 +195,7 @@ fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
     let limits = ModeLimits {
         follows: Regulated::Mean,
         index_limit: 0.9,
-        steady_share: 1.0,
+        steady_limit: 0.9,
         filled: false,
         ripple_share: 0.05,
         settled: true,

@@ -121,7 +121,7 @@ struct Outcome {
 const LIMITS: ModeLimits = ModeLimits {
     follows: Regulated::Mean,
     index_limit: 0.906,
-    steady_share: 1.0,
+    steady_limit: 0.906,
     filled: false,
     ripple_share: 0.05,
     settled: true,

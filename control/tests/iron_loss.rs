@@ -25,7 +25,7 @@ fn driven(tables: &Tables, share: f32, (rpm, udc_v): (f32, f32), demand_nm: f32)
     let limits = ModeLimits {
         follows: Regulated::Mean,
         index_limit: 1.0,
-        steady_share: 1.0,
+        steady_limit: 1.0,
         filled: false,
         ripple_share: 0.05,
         settled: true,

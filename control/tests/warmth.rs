@@ -22,7 +22,7 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
     let limits = ModeLimits {
         follows: Regulated::Mean,
         index_limit: 1.0,
-        steady_share: 1.0,
+        steady_limit: 1.0,
         filled: false,
         ripple_share: 0.05,
         settled: true,

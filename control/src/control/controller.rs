@@ -216,8 +216,11 @@ impl ControlLaw for Controller {
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
         let demand_nm = self.demand.step(&shaping, ratings);
         let link = self.link.step(udc_v * link_scale, change_v * link_scale, period_s);
-        let most = limits.index_limit * limits.steady_share;
-        let limit = VoltageLimit { udc_v: link.slow_v / flux, modulation_index: most, filled: limits.filled };
+        let limit = VoltageLimit {
+            udc_v: link.slow_v / flux,
+            modulation_index: limits.steady_limit,
+            filled: limits.filled,
+        };
         let trim_nm = self.trim.trim_nm(demand_nm, limits.ripple_share, ratings.max_torque_nm);
         let damping_nm = swing.map_or(0.0, |swing| {
             swing.damping_nm(law.gains.link_damping, demand_nm, omega, ratings.max_torque_nm)

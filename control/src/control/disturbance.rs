@@ -134,7 +134,7 @@ mod tests {
             let limits = ModeLimits {
                 follows: Regulated::Mean,
                 index_limit: 0.9,
-                steady_share: 1.0,
+                steady_limit: 0.9,
                 filled: false,
                 ripple_share: 0.05,
                 settled: true,

@@ -86,8 +86,8 @@ pub struct ModeLimits {
     pub follows: Regulated,
     /// Largest fundamental of the mode as a share of six-step.
     pub index_limit: f32,
-    /// Share of that which the operating point may use; what is left is for regulation.
-    pub steady_share: f32,
+    /// The part of it that the operating point may use; what is left is for regulation.
+    pub steady_limit: f32,
     /// The fundamental is to be that large, whatever the torque needs.
     pub filled: bool,
     /// Flux ripple of the pattern, as a share of the fundamental flux; zero where the samples do not tell what it does to the torque,

@@ -170,7 +170,7 @@ impl<L: ControlLaw> Axis<L> {
         let limits = ModeLimits {
             follows: Regulated::Mean,
             index_limit: LOOP_SHARE,
-            steady_share: STEADY_SHARE / LOOP_SHARE,
+            steady_limit: STEADY_SHARE,
             filled: false,
             // Linear motors: torque does not depend on the ripple.
             ripple_share: 1.0,

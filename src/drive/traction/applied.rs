@@ -71,7 +71,7 @@ pub(super) const fn follows(mode: Mode) -> Regulated {
 pub(super) const NO_LIMITS: ModeLimits = ModeLimits {
     follows: Regulated::Mean,
     index_limit: 0.0,
-    steady_share: 1.0,
+    steady_limit: 0.0,
     filled: false,
     ripple_share: 1.0,
     settled: true,
@@ -87,19 +87,20 @@ pub(super) fn limits(
 ) -> ModeLimits {
     let Settings { clock, devices, .. } = settings;
     let mode = decision.mode;
+    let follows = follows(mode);
     let rate = clock.angle_rate(omega);
     let largest = index_limit(mode, rate, devices);
     // Edges can move at an optimised pattern's largest index, too.
-    let is_all = mode.is_whole() || mode.is_optimal();
+    let is_all = !matches!(follows, Regulated::Mean | Regulated::Fundamental);
     let largest = if is_all { largest } else { REGULATION_ROOM * largest };
     // The last half before another pattern leads to the point that the torque's trim asks for there.
     let trimmed = if mode.is_pattern() && decision.after.is_pattern() { decision.after } else { mode };
     let (index_limit, filled) =
         exit.fill(mode, [index_floor(rate, devices), largest], modulation_index, passed_s);
     ModeLimits {
-        follows: follows(mode),
+        follows,
         index_limit,
-        steady_share: exit.open(mode, index_limit, passed_s),
+        steady_limit: exit.open(follows, index_limit, passed_s),
         filled,
         ripple_share: if aliases(mode, settings) { 0.0 } else { ripple_share(trimmed, modulation_index) },
         settled: exit.is_settled(decision),

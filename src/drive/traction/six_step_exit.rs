@@ -1,6 +1,7 @@
 //! Voltage and torque after square wave, and the voltage after a carrier.
 
 use super::slot::Decision;
+use crate::control::Regulated;
 use crate::frames::six_step_v;
 use crate::machine::Ratings;
 use crate::modulation::Mode;
@@ -99,17 +100,18 @@ impl SixStepExit {
         (if self.filled_to < largest { self.filled_to } else { largest }, true)
     }
 
-    /// The part of the `largest` fundamental that an operating point may use: all of it, but for a pattern that follows a carrier, which begins with the
+    /// The fundamental that an operating point may use, as a share of six-step: all of the `largest`, but for a pattern that follows a carrier, which begins with the
     /// carrier's and opens from there. A machine that the carrier weakened would change its current within one half: of three such machines two tripped and
     /// one took 12 % more current than either mode has, a car's; now it is 4, 1 and less than either.
-    pub(super) fn open(&mut self, decided: Mode, largest: f32, period_s: f32) -> f32 {
-        if decided.is_carrier() || decided.is_whole() {
-            self.opened_to = largest;
-            return 1.0;
-        }
+    pub(super) fn open(&mut self, follows: Regulated, largest: f32, period_s: f32) -> f32 {
         let opened = self.opened_to + EXIT_PER_S * period_s;
-        self.opened_to = if opened < 1.0 { opened } else { 1.0 };
-        if self.opened_to < largest { self.opened_to / largest } else { 1.0 }
+        self.opened_to = match follows {
+            Regulated::Mean => largest,
+            Regulated::Angle => 1.0,
+            _ if opened > 1.0 => 1.0,
+            _ => opened,
+        };
+        if self.opened_to < largest { self.opened_to } else { largest }
     }
 
     /// The part of a modulation index that has been opened, by which the mode is chosen: a carrier gives way to the pattern that begins where it ends.
@@ -217,19 +219,19 @@ mod tests {
         // 12 a second: a quarter in each of these periods.
         let period_s = 1.0 / 48.0;
         let mut exit = SixStepExit::new();
-        assert_eq!(exit.open(Mode::Mid3, 0.75, 0.0), 1.0, "out of rest");
+        assert_eq!(exit.open(Regulated::Fundamental, 0.75, 0.0), 0.75, "out of rest");
         assert_eq!(exit.opened(1.25), 1.0);
-        assert_eq!(exit.open(Mode::Async, 0.25, period_s), 1.0, "a carrier may use what it has");
+        assert_eq!(exit.open(Regulated::Mean, 0.25, period_s), 0.25, "a carrier may use what it has");
         assert_eq!([0.125, 0.5].map(|index| exit.opened(index)), [0.125, 0.25]);
-        assert_eq!(exit.open(Mode::Mid3, 1.0, period_s), 0.5);
-        assert_eq!(exit.open(Mode::Mid3, 0.75, 0.0), 0.5 / 0.75);
-        assert_eq!(exit.open(Mode::Mid7, 0.75, period_s), 1.0);
-        assert_eq!([0.5, 1.25].map(|index| exit.opened(index)), [0.5, 0.75]);
-        assert_eq!(exit.open(Mode::Mid7, 0.75, 1.0), 1.0);
+        assert_eq!(exit.open(Regulated::Fundamental, 0.75, period_s), 0.5);
+        assert_eq!(exit.open(Regulated::Fundamental, 0.75, 0.5 * period_s), 0.625);
+        assert_eq!([0.5, 1.25].map(|index| exit.opened(index)), [0.5, 0.625]);
+        assert_eq!(exit.open(Regulated::Fundamental, 0.75, period_s), 0.75);
+        assert_eq!(exit.open(Regulated::Fundamental, 0.75, period_s), 0.75);
         assert_eq!(exit.opened(1.25), 1.0, "no more than six-step");
-        let _ = exit.open(Mode::Sync12, 0.25, period_s);
-        assert_eq!(exit.open(Mode::Square, 1.0, period_s), 1.0, "the voltage is what it is");
-        assert_eq!(exit.open(Mode::Mid3, 0.75, 0.0), 1.0);
+        let _ = exit.open(Regulated::Mean, 0.25, period_s);
+        assert_eq!(exit.open(Regulated::Angle, 1.0, period_s), 1.0, "the voltage is what it is");
+        assert_eq!(exit.open(Regulated::Fundamental, 0.75, 0.0), 0.75);
     }
 
     #[test]

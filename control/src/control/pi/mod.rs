@@ -23,7 +23,7 @@
 //! let limits = ModeLimits {
 //!     follows: Regulated::Mean,
 //!     index_limit: 0.9,
-//!     # steady_share: 1.0,
+//!     # steady_limit: 0.9,
 //!     # filled: false,
 //!     # ripple_share: 0.05,
 //!     # settled: true,
@@ -191,7 +191,7 @@ impl ControlLaw for PiLaw {
         let before_v = self.link_v.unwrap_or(udc_v);
         let link_v = before_v + LINK_RAD_S * period_s * (udc_v - before_v);
         self.link_v = Some(link_v);
-        let limit_v = limits.index_limit * limits.steady_share * six_step_v(link_v);
+        let limit_v = limits.steady_limit * six_step_v(link_v);
         let point = self.reference.step(wanted_nm, self.weakening.moved_a(), tables);
         self.target = Target {
             torque_nm: point.torque_nm,
