@@ -21,15 +21,17 @@ pub struct Basis {
     terms: Vec<(usize, usize)>,
 }
 
-/// Chebyshev polynomials up to an order with their first four derivatives.
-fn chebyshev(x: f64, most: usize) -> Vec<[f64; 5]> {
-    let mut all = vec![[1.0, 0.0, 0.0, 0.0, 0.0], [x, 1.0, 0.0, 0.0, 0.0]];
-    for n in 1..most {
-        let (last, before) = (all[n], all[n - 1]);
+/// The first `N` Chebyshev polynomials, each with its first derivatives, `K` values in all.
+fn chebyshev<const N: usize, const K: usize>(x: f64) -> [[f64; K]; N] {
+    let mut all = [[0.0; K]; N];
+    all[0][0] = 1.0;
+    (all[1][0], all[1][1]) = (x, 1.0);
+    for n in 2..N {
+        let (last, before) = (all[n - 1], all[n - 2]);
         // The k-th derivative of 2 x T less the polynomial before.
-        let of =
-            |k: usize| 2.0 * x * last[k] - before[k] + if k > 0 { 2.0 * k as f64 * last[k - 1] } else { 0.0 };
-        all.push(core::array::from_fn(of));
+        all[n] = core::array::from_fn(|k| {
+            2.0 * x * last[k] - before[k] + if k > 0 { 2.0 * k as f64 * last[k - 1] } else { 0.0 }
+        });
     }
     all
 }
@@ -55,16 +57,28 @@ impl Basis {
     }
 
     /// The part of each term in a derivative of the co-energy, of these orders along d and q, at a current in A.
-    pub fn derivative(&self, (id, iq): (f64, f64), (along_d, along_q): (usize, usize)) -> Vec<f64> {
-        let along_x = chebyshev((id - self.middle_a) / self.width_d_a, MOST_D);
-        let along_y = chebyshev(iq / self.width_q_a, MOST_Q);
-        let scale = self.width_d_a.powi(along_d as i32) * self.width_q_a.powi(along_q as i32);
-        self.terms.iter().map(|(m, n)| along_x[*m][along_d] * along_y[*n][along_q] / scale).collect()
+    pub fn derivative(&self, current: (f64, f64), orders: (usize, usize)) -> Vec<f64> {
+        let [derivative] = self.derivatives::<1, 5>(current, [orders]);
+        derivative
     }
 
     /// The part of each term in the flux linkages along d and q at a current in A.
     pub fn flux(&self, current: (f64, f64)) -> [Vec<f64>; 2] {
-        [self.derivative(current, (1, 0)), self.derivative(current, (0, 1))]
+        self.derivatives::<2, 2>(current, [(1, 0), (0, 1)])
+    }
+
+    /// Derivatives of orders below `K`.
+    fn derivatives<const N: usize, const K: usize>(
+        &self,
+        (id, iq): (f64, f64),
+        orders: [(usize, usize); N],
+    ) -> [Vec<f64>; N] {
+        let along_x = chebyshev::<{ MOST_D + 1 }, K>((id - self.middle_a) / self.width_d_a);
+        let along_y = chebyshev::<{ MOST_Q + 1 }, K>(iq / self.width_q_a);
+        orders.map(|(along_d, along_q)| {
+            let scale = self.width_d_a.powi(along_d as i32) * self.width_q_a.powi(along_q as i32);
+            self.terms.iter().map(|(m, n)| along_x[*m][along_d] * along_y[*n][along_q] / scale).collect()
+        })
     }
 
     /// Currents on an even grid over the rectangle, of one sign along q.

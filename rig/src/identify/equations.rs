@@ -16,6 +16,8 @@ const UNSURE_EDGES: f64 = 1.5;
 const UNSURE_EDGES_TURNING: f64 = 8.0;
 /// Shortest part.
 const LEAST_PART: usize = 4;
+/// Rows of a block of the factorisation.
+const BLOCK: usize = 512;
 /// Currents along d and q at which the map's bends are weighed.
 const GRID: (u32, u32) = (26, 18);
 
@@ -152,16 +154,8 @@ impl Equations {
     /// # Errors
     /// Equations without one.
     pub fn solve(&self) -> Result<Solution> {
-        let matrix = DMatrix::from_row_slice(self.right.len(), self.unknowns, &self.rows);
-        // Columns of one length, so that rounding treats all alike.
-        let lengths: Vec<f64> =
-            matrix.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
-        let mut scaled = matrix;
-        for (mut column, length) in scaled.column_iter_mut().zip(&lengths) {
-            column /= *length;
-        }
-        let qr = scaled.qr();
-        let (right, factor) = (qr.q().transpose() * DVector::from_column_slice(&self.right), qr.r());
+        let lengths = self.lengths();
+        let (factor, right) = self.factor(&lengths);
         let solution = factor.solve_upper_triangular(&right);
         let solution = solution
             .filter(|found| found.iter().all(|value| value.is_finite()))
@@ -172,6 +166,35 @@ impl Equations {
         let freedom = self.samples.saturating_sub(self.unknowns).max(1);
         let sigma = (left.iter().map(|value| value * value).sum::<f64>() / freedom as f64).sqrt();
         Ok(Solution { unknowns, left, spread: Spread { factor, lengths, sigma } })
+    }
+
+    /// The lengths of the columns, by which they are divided, so that rounding treats all alike.
+    fn lengths(&self) -> Vec<f64> {
+        let mut squares = vec![0.0; self.unknowns];
+        for row in self.rows.chunks_exact(self.unknowns) {
+            squares.iter_mut().zip(row).for_each(|(square, value)| *square += value * value);
+        }
+        squares.into_iter().map(|square: f64| square.sqrt().max(f64::MIN_POSITIVE)).collect()
+    }
+
+    /// The triangular factor of the rows and what it is to give, by QR of one block of them after the other below the factor of those before: a block stays in
+    /// the processor's cache.
+    fn factor(&self, lengths: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+        let unknowns = self.unknowns;
+        let mut factor = DMatrix::zeros(0, unknowns + 1);
+        for (rows, right) in self.rows.chunks(BLOCK * unknowns).zip(self.right.chunks(BLOCK)) {
+            let before = factor.nrows();
+            let block = DMatrix::from_fn(before + right.len(), unknowns + 1, |row, column| {
+                match (row.checked_sub(before), lengths.get(column)) {
+                    (None, _) => factor[(row, column)],
+                    (Some(row), Some(length)) => rows[row * unknowns + column] / length,
+                    (Some(row), None) => right[row],
+                }
+            });
+            factor = block.qr().unpack_r();
+        }
+        let right = factor.column(unknowns).rows(0, unknowns).into_owned();
+        (factor.view((0, 0), (unknowns, unknowns)).into_owned(), right)
     }
 
     /// The rest of a row that the unknowns leave.
