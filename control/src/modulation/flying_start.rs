@@ -17,6 +17,21 @@ const LEAST: Angle = Angle(178_956_971);
 /// Ends of the first half are considered up to here, 135°, one after the other.
 const FARTHEST: Angle = Angle(0x6000_0000);
 
+/// `true` of an EMF, as a share of the link's voltage, that drives current through the diodes: its line voltage is more than the link's.
+///
+/// The diodes switch as square wave does, at its angle, so a pattern begins where they are. No carrier can lead as much flux as that:
+/// a first half that tried to, up to 135° long, was 2 to 8 times the largest current of machines whose magnets have that EMF.
+pub fn diodes_conduct(emf: AlphaBeta) -> bool {
+    emf.squared() > LARGEST_SHARE * LARGEST_SHARE
+}
+
+/// The number of the half of a pattern that begins nearest to a pulse angle.
+pub fn nearest(mode: Mode, pulse: Angle) -> u32 {
+    let halves = 2 * mode.carriers();
+    let half = ((u64::from(pulse.0) * u64::from(halves) + (1 << 31)) >> 32) as u32;
+    if half >= halves { 0 } else { half }
+}
+
 /// The first half of a pattern.
 #[derive(Clone, Copy, Debug)]
 pub struct FlyingStart {

@@ -1,7 +1,7 @@
 //! The modulator: one half after the other, and the switches between modes.
 
 use super::carrier::{self, Zeros};
-use super::flying_start::FlyingStart;
+use super::flying_start::{self, FlyingStart};
 use super::half::boundary;
 #[cfg(feature = "optimal")]
 use super::optimal::{self, Branch};
@@ -100,12 +100,14 @@ impl Modulator {
         let from = self.mode;
         self.choose_mode(start, pulse, &seen);
         let led = self.led(&seen);
-        let mut half = if from == Mode::Off && self.mode.is_pattern() {
-            self.start_flying(start, pulse, &seen)
-        } else if self.mode == Mode::Async {
-            carrier::asynchronous(self.next_half, start, &seen, led, &self.devices)
-        } else {
-            self.locked(start, pulse, &seen, led)
+        let flies = from == Mode::Off && self.mode.is_pattern();
+        let flying = if flies { self.start_flying(start, pulse, &seen) } else { None };
+        let mut half = match flying {
+            Some(half) => half,
+            None if self.mode == Mode::Async => {
+                carrier::asynchronous(self.next_half, start, &seen, led, &self.devices)
+            }
+            None => self.locked(start, pulse, &seen, led),
         };
         half.mode = self.mode;
         half.half = self.next_half as u8;
@@ -247,15 +249,20 @@ impl Modulator {
         }
     }
 
-    /// The first half of a pattern after none: one of a carrier, which leads the machine's flux to where the pattern begins.
+    /// The first half of a pattern after none: one of a carrier, which leads the machine's flux to where the pattern begins. Where the diodes
+    /// conduct there is none, and the pattern goes on from the half that begins nearest: they lead the flux as it would.
     #[cold]
     #[inline(never)]
-    fn start_flying(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> CarrierHalf {
-        let FlyingStart { half, turned, share } =
-            FlyingStart::new(self.mode, pulse, seen.share_within(start, 0), seen);
+    fn start_flying(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> Option<CarrierHalf> {
+        let emf = seen.share_within(start, 0);
+        if flying_start::diodes_conduct(emf) {
+            self.next_half = flying_start::nearest(self.mode, pulse);
+            return None;
+        }
+        let FlyingStart { half, turned, share } = FlyingStart::new(self.mode, pulse, emf, seen);
         self.next_half = half;
         let period_ticks = self.whole_ticks(turned.0 as f32 / seen.rate);
-        carrier::synchronous(half, period_ticks, Zeros::Early, share, &self.devices)
+        Some(carrier::synchronous(half, period_ticks, Zeros::Early, share, &self.devices))
     }
 
     /// One half of a carrier that is locked to the pulse angle.
