@@ -101,6 +101,22 @@ fn what_the_drive_would_refuse_is_not_written() {
     assert_eq!((said.trim().lines().count(), std::fs::read_dir(folder.path()).unwrap().count()), (1, 0));
 }
 
+/// Six pulses a turn into a fifth of the inductance: the current is four times the largest one, at least.
+#[test]
+fn a_ripple_that_leaves_no_trip_its_room_is_told_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let values = with("--ld", "0.06e-3").replace("20000", "420");
+    let output = new(&values, &folder.path().join("made"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.starts_with("--max-switching-hz 420: with the ripple")
+            && said.contains("4 × --max-current, 128 A"),
+        "{said}"
+    );
+    assert_eq!((said.trim().lines().count(), std::fs::read_dir(folder.path()).unwrap().count()), (1, 0));
+}
+
 #[test]
 fn a_folder_is_made_whole_replaced_whole_and_others_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();

@@ -255,7 +255,7 @@ impl Modulator {
     #[inline(never)]
     fn start_flying(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> Option<CarrierHalf> {
         let emf = seen.share_within(start, 0);
-        if flying_start::diodes_conduct(emf) {
+        if flying_start::diodes_lead(emf, pulse, seen) {
             self.next_half = flying_start::nearest(self.mode, pulse);
             return None;
         }

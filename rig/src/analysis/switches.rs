@@ -123,8 +123,8 @@ pub fn switch_verdicts(
     let torque_nm = worst(switches.iter().map(|switch| switch.torque_excursion_nm));
     let most_nm = bound(options, EXCURSION * largest_nm, f64::INFINITY);
     let (hunts, turn_ons) = (hunts(recording) as f64, most_turn_ons(recording, 0.1) as f64);
-    // One more than the frequency gives: both ends of a window may fall on a turn-on.
-    let most_turn_ons = (0.1 * machine.folder.parameters.max_switching_hz).floor() + 1.0;
+    // One more than the carriers that there are, a part of one counted as one: turn-ons move within their carriers.
+    let most_turn_ons = (machine.folder.parameters.max_switching_hz / 10.0).ceil() + 1.0;
     let current = "current over the larger steady envelope in %";
     let torque = "torque beyond the steady ripple band in N·m";
     let hunting = "hunting: switches back without a cause";

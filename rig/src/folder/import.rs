@@ -73,7 +73,7 @@ impl Import {
         let map = self.resampled(&half)?;
         let mut ratings = Ratings::of(&map, &self.given)?;
         let comment = format!("# From {}.\n", self.map.display());
-        let contents = ratings.contents(&self.given, &self.told(), write::csv(&map, &comment));
+        let contents = ratings.contents(&self.given, &self.told(), write::csv(&map, &comment))?;
         write::folder(&self.given.out, &contents)?;
         ratings.say(&self.given)
     }

@@ -43,7 +43,7 @@ impl Nameplate {
         self.check()?;
         let map = self.map();
         let mut ratings = Ratings::of(&map, &self.given)?;
-        let contents = ratings.contents(&self.given, &self.told(), self.csv(&map));
+        let contents = ratings.contents(&self.given, &self.told(), self.csv(&map))?;
         write::folder(&self.given.out, &contents)?;
         ratings.say(&self.given)
     }

@@ -1,7 +1,7 @@
 //! The ratings that follow from a flux map and the limits, and `machine.toml` of both.
 
 use super::given::Given;
-use super::ripple::{ROOM, trip_current_a};
+use super::ripple::{MOST_TRIP, ROOM, trip_current_a};
 use super::write::{Contents, digits, toml};
 use crate::machine::Machine;
 use anyhow::{Result, ensure};
@@ -72,12 +72,23 @@ impl Ratings {
 
     /// The two files of a folder with this `flux_map.csv`; `command` are the words that made it. The ripple of the machine's pulses is looked at, and where
     /// it needs room a trip of its own chosen.
-    pub fn contents(&mut self, given: &Given, command: &str, map: String) -> Contents {
+    ///
+    /// # Errors
+    /// A ripple that no trip leaves room.
+    pub fn contents(&mut self, given: &Given, command: &str, map: String) -> Result<Contents> {
         // What the generator or the drive refuses is told where it is written.
         let folder = MachineFolder::parse(&self.toml(given, command), &map).ok();
         let machine = folder.map(Machine::of).filter(|machine| machine.tables.check().is_ok());
         self.trip_current_a = machine.and_then(|machine| trip_current_a(&machine)).map(rounded_down);
-        Contents { toml: self.toml(given, command), map }
+        let (hz, most_a) = (given.max_switching_hz, digits(MOST_TRIP * given.max_current));
+        if let Some(trip_a) = self.trip_current_a {
+            ensure!(
+                trip_a <= most_a,
+                "--max-switching-hz {hz}: with the ripple of these pulses the current is up to {:.0} A, and a trip with room above that, {trip_a} A, is more than 4 × --max-current, {most_a} A",
+                trip_a / (1.0 + ROOM)
+            );
+        }
+        Ok(Contents { toml: self.toml(given, command), map })
     }
 
     /// `machine.toml`.

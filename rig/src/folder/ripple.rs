@@ -9,6 +9,9 @@ use tractive::modulation::{Mode, index_limit};
 /// Least distance of the trip from the highest current at full torque, as a share of it: room for steps and changes of mode.
 pub const ROOM: f64 = 0.15;
 
+/// Highest trip that the table generator takes, as a share of the largest current.
+pub const MOST_TRIP: f64 = 4.0;
+
 /// The current that the drive trips at, in A, where the machine's own default leaves the ripple no room: in steady state at full torque, of any mode and
 /// link in normal operation, the current stays well below it.
 pub fn trip_current_a(machine: &Machine) -> Option<f64> {
