@@ -1,10 +1,12 @@
 //! Every scenario of the two-level drive with a machine of 48 V and 20 kHz, by the rule of exit code 0: no fault, and no bound that
 //! falls short.
 
+mod nameplate;
+
+use nameplate::made;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::process::Command;
-use tempfile::TempDir;
 use tractive_rig::analysis::Figures;
 use tractive_rig::machine::Machine;
 use tractive_rig::scenario::catalogue;
@@ -147,19 +149,6 @@ fn swept(values: &str, options: &str) -> (Recording, Figures) {
     assert!(recording.trip().is_none(), "{values}: {:?}", recording.trip().map(|trip| trip.fault.name()));
     let figures = chosen.figures(&recording, &machine);
     (recording, figures)
-}
-
-/// A machine folder of a nameplate's values.
-fn made(values: &str) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let made = Command::new(env!("CARGO_BIN_EXE_tractive-rig"))
-        .args(["machine", "new", "--out"])
-        .arg(folder.path())
-        .args(values.split(' '))
-        .output()
-        .unwrap();
-    assert!(made.status.success(), "{made:?}");
-    folder
 }
 
 fn keeps_its_bounds(values: &str, scenarios: &[(&str, usize)]) {

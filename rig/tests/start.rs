@@ -1,10 +1,11 @@
 //! Starts without an angle: wherever the rotor stands, the drive finds out before it turns it.
 
+mod nameplate;
+
+use nameplate::made;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
-use std::process::Command;
-use tempfile::TempDir;
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::{Recorded, Recording};
 
@@ -105,14 +106,4 @@ fn a_machine_without_an_axis_is_told_and_not_turned() {
     assert_eq!(recording.trip().unwrap().fault.name(), "position_sensor");
     let fastest_rpm = recording.rows.iter().map(|row| row.speed_rpm.abs()).fold(0.0, f64::max);
     assert!(recording.found.is_none() && fastest_rpm < 20.0, "{fastest_rpm} r/min");
-}
-
-/// A machine folder of a nameplate's values.
-fn made(values: &str) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let place = folder.path().to_str().unwrap();
-    let words = ["machine", "new", "--out", place].into_iter().chain(values.split(' '));
-    let made = Command::new(env!("CARGO_BIN_EXE_tractive-rig")).args(words).output().unwrap();
-    assert!(made.status.success(), "{made:?}");
-    folder
 }

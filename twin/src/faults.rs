@@ -147,7 +147,7 @@ pub struct Seen {
 }
 
 /// The instants of an undisturbed start at which a register is accessed for the first time, and those half-way between them, which lie in its
-/// waits. Accesses that are not [`APART`] are one.
+/// waits. Accesses that are not [`APART`] are one. The error is that of an image that does not run.
 pub fn starting(image: &Path, system: System) -> Result<Vec<Time>> {
     let mut cpu = drive(image, system)?;
     cpu.machine_mut().record = Some(Vec::new());

@@ -86,7 +86,7 @@ pub struct ModeLimits {
     pub follows: Regulated,
     /// Largest fundamental of the mode as a share of six-step.
     pub index_limit: f32,
-    /// The part of it that the operating point may use; what is left is for regulation.
+    /// Largest fundamental that the operating point may use, as a share of six-step; what is left of [`Self::index_limit`] is for regulation.
     pub steady_limit: f32,
     /// The fundamental is to be that large, whatever the torque needs.
     pub filled: bool,

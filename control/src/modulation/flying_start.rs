@@ -2,7 +2,8 @@
 //!
 //! The flux in the machine is that of the magnets. A pattern that began at once would leave its hexagon off the centre by what is missing,
 //! and the machine with a current that decays slowly. So the first half is a carrier's, as long as it takes to lead the
-//! flux to the hexagon, to the corner or the middle of an edge where it will be at that time by the pattern's angle.
+//! flux to the hexagon, to the corner or the middle of an edge where it will be at that time by the pattern's angle. Where the diodes conduct all the time
+//! they have led it there already.
 
 use super::half::boundary;
 use super::{Mode, Reference, RippleFlux};
@@ -28,18 +29,11 @@ const LED_WITHIN: f32 = 0.4;
 /// `true` of an EMF, as a share of the link's voltage, that drives current through the diodes in steady state.
 ///
 /// The diodes switch as square wave does, at its angle, so a pattern begins where they are. No carrier can lead as much flux as that:
-/// a first half that tried to, up to 135° long, was 2 to 8 times the largest current of machines whose magnets have that EMF.
+/// with a first half that tried to, up to 135° long, machines whose magnets have that EMF took 2 to 8 times their largest current.
 pub fn diodes_lead(emf: AlphaBeta, pulse: Angle, seen: &Reference) -> bool {
     let round = (pulse - Angle::DEG_90).sin_cos();
     let off = emf - AlphaBeta { alpha: round.cos, beta: round.sin } * (seen.voltage_v / seen.udc_v);
     emf.squared() > CONDUCTING * CONDUCTING && off.squared() < LED_WITHIN * LED_WITHIN
-}
-
-/// The number of the half of a pattern that begins nearest to a pulse angle.
-pub fn nearest(mode: Mode, pulse: Angle) -> u32 {
-    let halves = 2 * mode.carriers();
-    let half = ((u64::from(pulse.0) * u64::from(halves) + (1 << 31)) >> 32) as u32;
-    if half >= halves { 0 } else { half }
 }
 
 /// The first half of a pattern.
@@ -81,11 +75,12 @@ impl FlyingStart {
 
 #[cfg(test)]
 mod tests {
+    use super::super::schedule::nearest;
     use super::super::{Modulator, Schedule, SwitchLimits};
     use super::*;
     use crate::time::{Clock, Instant};
 
-    /// An EMF along α and along β, beside a fundamental along u of six-step.
+    /// An EMF along α and along β, beside a fundamental of six-step along α.
     #[test]
     fn diodes_lead_where_they_conduct_all_the_time_and_near_the_pattern() {
         let seen = Reference::turning(
@@ -114,7 +109,7 @@ mod tests {
         for mode in [Mode::Mid7, Mode::Mid3, Mode::Square] {
             let half = boundary(1, mode.carriers()).0;
             for pulse in (0..720).map(|k| Angle(k * (u32::MAX / 720))) {
-                let nearest = nearest(mode, pulse);
+                let nearest = nearest(2 * mode.carriers(), pulse);
                 let off = (boundary(nearest, mode.carriers()) - pulse).signed().unsigned_abs();
                 assert!(nearest < 2 * mode.carriers() && off <= half / 2 + 1, "{} {pulse:?}", mode.name());
             }

@@ -256,7 +256,7 @@ impl Modulator {
     fn start_flying(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> Option<CarrierHalf> {
         let emf = seen.share_within(start, 0);
         if flying_start::diodes_lead(emf, pulse, seen) {
-            self.next_half = flying_start::nearest(self.mode, pulse);
+            self.next_half = schedule::nearest(2 * self.mode.carriers(), pulse);
             return None;
         }
         let FlyingStart { half, turned, share } = FlyingStart::new(self.mode, pulse, emf, seen);

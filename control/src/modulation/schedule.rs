@@ -334,16 +334,17 @@ pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
     match (from.carriers(), to.carriers()) {
         (_, 0) => 0,
         #[cfg(feature = "optimal")]
-        (0, new) if to.is_optimal() => {
-            let half = ((u64::from(pulse.0) * u64::from(2 * new) + (1 << 31)) >> 32) as u32;
-            if half >= 2 * new { 0 } else { half }
-        }
-        (0, new) => {
-            let carrier = ((u64::from(pulse.0) * u64::from(new) + (1 << 31)) >> 32) as u32;
-            if carrier >= new { 0 } else { carrier * 2 }
-        }
+        (0, new) if to.is_optimal() => nearest(2 * new, pulse),
+        (0, new) => nearest(new, pulse) * 2,
         (old, new) => next_half * new / old,
     }
+}
+
+/// The number of the part that begins nearest to a pulse angle, of so many in a turn.
+#[inline(always)]
+pub(super) fn nearest(parts: u32, pulse: Angle) -> u32 {
+    let part = ((u64::from(pulse.0) * u64::from(parts) + (1 << 31)) >> 32) as u32;
+    if part >= parts { 0 } else { part }
 }
 
 #[cfg(test)]

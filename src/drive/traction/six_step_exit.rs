@@ -101,8 +101,8 @@ impl SixStepExit {
     }
 
     /// The fundamental that an operating point may use, as a share of six-step: all of the `largest`, but for a pattern that follows a carrier, which begins with the
-    /// carrier's and opens from there. A machine that the carrier weakened would change its current within one half: of three such machines two tripped and
-    /// one took 12 % more current than either mode has, a car's; now it is 4, 1 and less than either.
+    /// carrier's and opens from there. A machine that the carrier weakened would change its current within one half: of three such machines two tripped, and
+    /// a car's took 12 % more current than either mode has; now the three take 4 % more at most.
     pub(super) fn open(&mut self, follows: Regulated, largest: f32, period_s: f32) -> f32 {
         let opened = self.opened_to + EXIT_PER_S * period_s;
         self.opened_to = match follows {
