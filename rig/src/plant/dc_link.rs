@@ -4,6 +4,8 @@
 //! closed, or, where there is a choke, `L di_source/dt = U − u − R i_source` through the main one; a rectifier gives current only, a
 //! reversible source takes it too.
 
+use super::runge_kutta::stepped;
+
 /// The source of the link's energy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
@@ -152,6 +154,14 @@ impl DcLink {
             udc_v * chopper_a,
             udc_v * inverter_a,
         ]
+    }
+
+    /// Lets time pass while the inverter takes a constant current, in A.
+    pub(super) fn advance(&mut self, inverter_a: f64, dt_s: f64) {
+        let y0 = [self.udc_v, self.choke_a, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let [udc_v, choke_a, energies @ ..] =
+            stepped(&y0, [(); 3], dt_s, |y, ()| self.slopes(y[0], y[1], inverter_a));
+        self.finish(udc_v, choke_a, energies);
     }
 
     pub(super) fn finish(&mut self, udc_v: f64, choke_a: f64, energies: [f64; 5]) {

@@ -81,6 +81,11 @@ impl Clamp {
         0.5 - 0.5 * (current_a / self.small_current_a).clamp(-1.0, 1.0)
     }
 
+    /// Width of the linear zone, in A: the current below which an open leg is a resistor.
+    pub fn small_current_a(&self) -> f64 {
+        self.small_current_a
+    }
+
     /// Longest step while legs are open, in s: short near the linear zone.
     pub fn step_s(&self, udc_v: f64, currents_a: [f64; 3], legs: &[Leg; 3]) -> f64 {
         let open = currents_a.iter().zip(legs).filter(|(_, leg)| **leg == Leg::Open);

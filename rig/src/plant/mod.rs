@@ -7,9 +7,11 @@
 
 mod dc_link;
 mod devices;
+
 mod legs;
 mod line_filter;
 mod motor;
+mod rest;
 mod rotor;
 mod runge_kutta;
 mod shaft;
@@ -35,7 +37,7 @@ pub use vector::Vector;
 pub use wheel::Wheel;
 
 use legs::{Clamp, LONGEST_STEP_S};
-use runge_kutta::{along, rotated};
+use runge_kutta::{rotated, stepped};
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
 /// The deviations of the true machine from its folder.
@@ -77,6 +79,15 @@ pub struct Plant {
     flux_scale: f64,
 }
 
+/// The rotor frame at an instant.
+#[derive(Clone, Copy)]
+struct Frame {
+    /// Sine and cosine of its angle.
+    sin_cos: (f64, f64),
+    /// Its electrical speed, in rad/s.
+    omega: f64,
+}
+
 /// The quantities that are integrated: id, iq, electrical energy, copper loss, the torque's impulse.
 type State = [f64; 5];
 /// The same, and of the link its voltage, its choke's current and its five energies.
@@ -113,65 +124,59 @@ impl Plant {
 
     /// Lets time pass with the legs unchanged.
     pub fn advance(&mut self, legs: [Leg; 3], udc_v: f64, dt_s: f64) {
-        let open = legs.contains(&Leg::Open);
-        let mut left = dt_s;
-        while left > 0.0 {
-            let longest = if open {
-                self.clamp.step_s(udc_v, self.motor.currents_abc(), &legs)
+        let mut left_s = dt_s;
+        while left_s > 0.0 {
+            left_s -= if let Some(rest) = self.rest(legs, udc_v, left_s) {
+                self.finish(rest.state, rest.dt_s);
+                rest.dt_s
             } else {
-                LONGEST_STEP_S
+                let step_s = self.step_s(&legs, udc_v, left_s);
+                self.step(legs, udc_v, step_s);
+                step_s
             };
-            let steps = (left / longest).ceil().max(1.0);
-            let step = if open { left.min(longest) } else { left / steps };
-            self.step(legs, udc_v, step);
-            left = if steps <= 1.0 { 0.0 } else { left - step };
         }
     }
 
     /// Lets time pass with the legs and the link's switches unchanged, on a link whose voltage follows.
     pub fn advance_on(&mut self, link: &mut DcLink, legs: [Leg; 3], dt_s: f64) {
-        let open = legs.contains(&Leg::Open);
-        let mut left = dt_s;
-        while left > 0.0 {
-            let longest = if open {
-                self.clamp.step_s(link.udc_v.max(1.0), self.motor.currents_abc(), &legs).min(LONGEST_STEP_S)
+        let mut left_s = dt_s;
+        while left_s > 0.0 {
+            left_s -= if let Some(rest) = self.rest(legs, link.udc_v, left_s) {
+                link.advance(rest.link_a, rest.dt_s);
+                self.finish(rest.state, rest.dt_s);
+                rest.dt_s
             } else {
-                LONGEST_STEP_S
+                let step_s = self.step_s(&legs, link.udc_v, left_s);
+                self.step_on(link, legs, step_s);
+                step_s
             };
-            let steps = (left / longest).ceil().max(1.0);
-            let step = if open { left.min(longest) } else { left / steps };
-            self.step_on(link, legs, step);
-            left = if steps <= 1.0 { 0.0 } else { left - step };
+        }
+    }
+
+    /// The next step of so much time that is left, in s: even parts of it, but where diodes decide.
+    fn step_s(&self, legs: &[Leg; 3], udc_v: f64, left_s: f64) -> f64 {
+        if legs.contains(&Leg::Open) {
+            let longest_s = self.clamp.step_s(udc_v.max(1.0), self.motor.currents_abc(), legs);
+            left_s.min(longest_s).min(LONGEST_STEP_S)
+        } else {
+            left_s / (left_s / LONGEST_STEP_S).ceil().max(1.0)
         }
     }
 
     fn step(&mut self, legs: [Leg; 3], udc_v: f64, dt_s: f64) {
         let y0: State = [self.motor.id_a, self.motor.iq_a, 0.0, 0.0, 0.0];
-        let y = self
-            .integrate(&y0, dt_s, |y, frame, omega| self.slope((y[0], y[1]), legs, udc_v, frame, omega).0);
+        let y = self.integrate(&y0, dt_s, |y, frame| self.slope((y[0], y[1]), legs, udc_v, frame).0);
         self.finish(y, dt_s);
     }
 
     /// The same with the link's voltage as one more state: what the legs take of its current is what they give the machine.
     fn step_on(&mut self, link: &mut DcLink, legs: [Leg; 3], dt_s: f64) {
-        let y0: LinkedState = [
-            self.motor.id_a,
-            self.motor.iq_a,
-            0.0,
-            0.0,
-            0.0,
-            link.udc_v,
-            link.choke_a,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        ];
+        let (id, iq) = self.motor.currents_dq();
+        let y0: LinkedState = [id, iq, 0.0, 0.0, 0.0, link.udc_v, link.choke_a, 0.0, 0.0, 0.0, 0.0, 0.0];
         let [id, iq, electrical, copper, impulse, udc_v, choke_a, energies @ ..] =
-            self.integrate(&y0, dt_s, |y, frame, omega| {
+            self.integrate(&y0, dt_s, |y, frame| {
                 let ([id, iq, electrical, copper, impulse], current) =
-                    self.slope((y[0], y[1]), legs, y[5], frame, omega);
+                    self.slope((y[0], y[1]), legs, y[5], frame);
                 let link_slopes = link.slopes(y[5], y[6], current);
                 let mut slopes = [0.0; 12];
                 slopes[..5].copy_from_slice(&[id, iq, electrical, copper, impulse]);
@@ -191,23 +196,16 @@ impl Plant {
         &self,
         y0: &[f64; N],
         dt_s: f64,
-        slope: impl Fn(&[f64; N], (f64, f64), f64) -> [f64; N],
+        slope: impl Fn(&[f64; N], Frame) -> [f64; N],
     ) -> [f64; N] {
         let rotor = &self.motor.rotor;
         let turning = rotor.turning(|| self.motor.torque_nm(), dt_s);
         let begin = rotor.sin_cos();
-        let middle = rotated(begin, libm::sincos(turning.turned(0.5 * dt_s)));
-        let end = rotated(begin, libm::sincos(turning.turned(dt_s)));
-        let half = turning.omega(0.5 * dt_s);
-        let k1 = slope(y0, begin, turning.omega(0.0));
-        let k2 = slope(&along(y0, &k1, 0.5 * dt_s), middle, half);
-        let k3 = slope(&along(y0, &k2, 0.5 * dt_s), middle, half);
-        let k4 = slope(&along(y0, &k3, dt_s), end, turning.omega(dt_s));
-        let mut y = *y0;
-        for (index, value) in y.iter_mut().enumerate() {
-            *value += dt_s / 6.0 * (k1[index] + 2.0 * (k2[index] + k3[index]) + k4[index]);
-        }
-        y
+        let frame = |t_s: f64| Frame {
+            sin_cos: if t_s > 0.0 { rotated(begin, libm::sincos(turning.turned(t_s))) } else { begin },
+            omega: turning.omega(t_s),
+        };
+        stepped(y0, [frame(0.0), frame(0.5 * dt_s), frame(dt_s)], dt_s, |y, frame| slope(y, *frame))
     }
 
     /// Rates of change, and the current that the legs take from the link.
@@ -216,8 +214,7 @@ impl Plant {
         (id, iq): (f64, f64),
         legs: [Leg; 3],
         udc_v: f64,
-        sin_cos: (f64, f64),
-        omega: f64,
+        Frame { sin_cos, omega }: Frame,
     ) -> (State, f64) {
         let currents = Vector::from_rotor((id, iq), sin_cos).phases();
         let mut volts = [0.0; 3];

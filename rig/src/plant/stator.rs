@@ -218,6 +218,25 @@ impl Stator {
         }
     }
 
+    /// The change of a current in A over `dt_s`, in A, by one implicit step, with a resistance in ohm between each phase and a common point, where it changes at these
+    /// rates in A/s now: `(L/dt + R + jωL) Δi = L di/dt`.
+    pub fn settles(
+        &self,
+        (id, iq): (f64, f64),
+        outside_ohm: f64,
+        omega: f64,
+        (id_a_s, iq_a_s): (f64, f64),
+        dt_s: f64,
+    ) -> (f64, f64) {
+        let FluxPoint { ldd_h, ldq_h, lqd_h, lqq_h, .. } = self.flux(id, iq);
+        let ohm = self.resistance_ohm + outside_ohm;
+        let (dd, dq) = (ldd_h / dt_s + ohm - omega * lqd_h, ldq_h / dt_s - omega * lqq_h);
+        let (qd, qq) = (lqd_h / dt_s + omega * ldd_h, lqq_h / dt_s + ohm + omega * ldq_h);
+        let (vd, vq) = (ldd_h * id_a_s + ldq_h * iq_a_s, lqd_h * id_a_s + lqq_h * iq_a_s);
+        let det = dd * qq - dq * qd;
+        ((qq * vd - dq * vq) / det, (dd * vq - qd * vd) / det)
+    }
+
     /// Energy that the rotor gives when the gates are blocked, in J, at a current in A and a speed in mechanical rad/s: its power falls
     /// to nothing while `against_v` takes the flux linkage away.
     pub fn braked_j(&self, (id_a, iq_a): (f64, f64), speed_rad_s: f64, against_v: f64) -> f64 {

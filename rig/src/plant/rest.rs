@@ -1,0 +1,126 @@
+//! A machine at rest behind open legs.
+//!
+//! While its current is near zero in all phases, an open leg is a resistor, and stator and legs settle within microseconds. Once they have, the
+//! current goes as slowly as speed and link do: one implicit step follows it as far as the next event, where explicit ones would go by the
+//! microsecond.
+
+use super::legs::LONGEST_STEP_S;
+use super::runge_kutta::rotated;
+use super::{Frame, Leg, Plant, State};
+
+/// Change of the current within a step up to which it has settled, as a share of the linear zone's width.
+const SETTLED_SHARE: f64 = 0.01;
+
+/// A step at rest.
+pub(super) struct Rest {
+    /// Its length, in s.
+    pub dt_s: f64,
+    /// The state that it leads to.
+    pub state: State,
+    /// Current that the legs take from the link, in A.
+    pub link_a: f64,
+}
+
+impl Plant {
+    /// The step of at most `left_s` that the machine makes at rest; `None`: it is not at rest.
+    pub(super) fn rest(&self, legs: [Leg; 3], udc_v: f64, left_s: f64) -> Option<Rest> {
+        let small_a = self.clamp.small_current_a();
+        let is_within = |(d, q): (f64, f64), most_a: f64| d * d + q * q <= most_a * most_a;
+        let (id, iq) = self.motor.currents_dq();
+        if legs != [Leg::Open; 3] || !is_within((id, iq), small_a) {
+            return None;
+        }
+        let dt_s = left_s.min(LONGEST_STEP_S);
+        let rotor = &self.motor.rotor;
+        let turning = rotor.turning(|| self.motor.torque_nm(), dt_s);
+        let omega = turning.omega(dt_s);
+        let end = Frame { sin_cos: rotated(rotor.sin_cos(), libm::sincos(turning.turned(dt_s))), omega };
+        let ([id_a_s, iq_a_s, ..], _) = self.slope((id, iq), legs, udc_v, end);
+        let leg_ohm = (0.5 * udc_v + self.drops.diode_v) / small_a + self.drops.diode_ohm;
+        let (by_d, by_q) = self.motor.stator.settles((id, iq), leg_ohm, omega, (id_a_s, iq_a_s), dt_s);
+        let after = (id + by_d, iq + by_q);
+        if !is_within((by_d, by_q), SETTLED_SHARE * small_a) || !is_within(after, small_a) {
+            return None;
+        }
+        let ([.., electrical_w, copper_w, torque_nm], link_a) = self.slope(after, legs, udc_v, end);
+        let state = [after.0, after.1, dt_s * electrical_w, dt_s * copper_w, dt_s * torque_nm];
+        Some(Rest { dt_s, state, link_a })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{DcLink, DcLinkSettings, DeviceDrops, PlantSettings, Source, SpeedSource};
+    use tractive_tablegen::MachineFolder;
+
+    const OPEN: [Leg; 3] = [Leg::Open; 3];
+    const UDC_V: f64 = 1_500.0;
+
+    fn plant(name: &str, speed_rpm: f64, settings: &PlantSettings) -> Plant {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables").join(name);
+        let speed = SpeedSource::profile(vec![(0.0, speed_rpm), (0.02, 1.1 * speed_rpm)]);
+        Plant::new(&MachineFolder::read(&folder).unwrap(), speed, settings)
+    }
+
+    fn link() -> DcLink {
+        let source = Source {
+            voltage_v: UDC_V,
+            resistance_ohm: 0.1,
+            inductance_h: 0.0,
+            reversible: false,
+            live: false,
+        };
+        let settings = DcLinkSettings {
+            capacitance_f: 4e-3,
+            source,
+            precharge_ohm: 10.0,
+            discharge_ohm: 100.0,
+            auxiliary_ohm: 1e4,
+            chopper_ohm: 5.0,
+        };
+        DcLink { udc_v: UDC_V, ..DcLink::new(settings) }
+    }
+
+    /// At rest, and by explicit steps all the way: the same current, torque and energy, and the same link, of a machine that is let go of with a current.
+    #[test]
+    fn a_machine_at_rest_does_what_small_steps_say() {
+        let drops = DeviceDrops { igbt_v: 2.0, igbt_ohm: 5e-3, diode_v: 1.5, diode_ohm: 3e-3 };
+        let flawed = PlantSettings { slots_share: 0.08, drops, ..PlantSettings::default() };
+        for settings in [PlantSettings::default(), flawed] {
+            let [mut rests, mut steps] =
+                [(); 2].map(|()| (plant("pmasynrm-180kw", 1_000.0, &settings), link()));
+            for (plant, _) in [&mut rests, &mut steps] {
+                plant.motor.set_currents(-0.3, 0.2);
+            }
+            let mut steps_at_rest = 0;
+            for _ in 0..2_000 {
+                const DT_S: f64 = 10e-6;
+                let (plant, link) = &mut rests;
+                steps_at_rest += u32::from(plant.rest(OPEN, link.udc_v, DT_S).is_some());
+                plant.advance_on(link, OPEN, DT_S);
+                let (plant, link) = &mut steps;
+                for _ in 0..10 {
+                    plant.step_on(link, OPEN, 0.1 * DT_S);
+                }
+            }
+            let [(a, link_a), (b, link_b)] = [&rests, &steps];
+            let near = |x: f64, y: f64, within: f64| assert!((x - y).abs() < within, "{x} {y}");
+            let small_a = a.clamp.small_current_a();
+            near(a.motor.id_a, b.motor.id_a, 1e-4 * small_a);
+            near(a.motor.iq_a, b.motor.iq_a, 1e-4 * small_a);
+            near(a.motor.energies.electrical_j, b.motor.energies.electrical_j, 1e-3);
+            near(a.motor.energies.mechanical_j, b.motor.energies.mechanical_j, 1e-3);
+            near(link_a.udc_v, link_b.udc_v, 1e-4);
+            assert!(steps_at_rest > 1_900, "{steps_at_rest}");
+        }
+    }
+
+    /// One whose EMF is beyond the link's voltage charges it: it is not at rest.
+    #[test]
+    fn a_machine_that_charges_the_link_is_not_at_rest() {
+        let mut plant = plant("pmasynrm-180kw", 6_000.0, &PlantSettings::default());
+        plant.advance(OPEN, 300.0, 5e-3);
+        assert!(plant.rest(OPEN, 300.0, 1e-5).is_none());
+    }
+}
