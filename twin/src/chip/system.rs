@@ -82,6 +82,11 @@ impl System {
         self.word("SYSCFG", 0x20) >> (offset >> 10) & 1 != 0
     }
 
+    /// `true` if none of it can be written.
+    pub fn is_all_protected(&self) -> bool {
+        self.word("SYSCFG", 0x20) == u32::MAX
+    }
+
     /// The conditions of a fast clock.
     pub fn supply(&self) -> Supply {
         Supply { latency: self.word("FLASH", 0) & 0xF, boosted: self.word("PWR", 0x80) & 1 << 8 == 0 }

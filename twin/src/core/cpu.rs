@@ -8,7 +8,9 @@ use crate::time::Time;
 use anyhow::{Result, anyhow, bail};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
-use unicorn_engine::{Arch, ArmCpuModel, HookType, Mode, Permission, RegisterARM as R, Unicorn, uc_error};
+use unicorn_engine::{
+    Arch, ArmCpuModel, HookType, MemType, Mode, Permission, RegisterARM as R, UcHookId, Unicorn, uc_error,
+};
 
 /// RAM: its address, and the length of SRAM1, SRAM2 and the CCM SRAM's alias (RM0440, memory map).
 const RAM: (u32, u32) = (0x2000_0000, 128 * 1024);
@@ -84,6 +86,8 @@ pub struct Cpu {
     entered: Vec<(Time, Option<Waits>)>,
     /// The vector table's first two words.
     start: (u32, u32),
+    /// The hook that tells of writes to the CCM SRAM, while it can be written.
+    code_writes: Option<UcHookId>,
 }
 
 fn failed(error: uc_error) -> anyhow::Error {
@@ -121,11 +125,17 @@ impl Cpu {
             };
             engine.mmio_map(origin.into(), length as usize, Some(read), Some(write)).map_err(failed)?;
         }
-        hook(&mut engine, ram_end == CCM_ALIAS).map_err(failed)?;
+        hook(&mut engine).map_err(failed)?;
         // After power-up nobody knows what the memory holds.
         engine.mem_write(ram.0.into(), &vec![PAINT; ram.1 as usize]).map_err(failed)?;
-        let mut cpu =
-            Self { engine, longest: BTreeMap::new(), entered: Vec::new(), start: (word(0), word(4)) };
+        let mut cpu = Self {
+            engine,
+            longest: BTreeMap::new(),
+            entered: Vec::new(),
+            start: (word(0), word(4)),
+            code_writes: None,
+        };
+        cpu.open_code()?;
         cpu.begin()?;
         Ok(cpu)
     }
@@ -157,9 +167,34 @@ impl Cpu {
         hook_loads(&mut self.engine).and_then(|()| self.engine.ctl_flush_tb()).map_err(failed)
     }
 
+    /// The CCM SRAM can be written, and the emulator tells of it, if the image has code there.
+    fn open_code(&mut self) -> Result<()> {
+        if self.start.0 > CCM_ALIAS || self.code_writes.is_some() {
+            return Ok(());
+        }
+        self.engine.mem_protect(CCM.0.into(), CCM.1 as usize, Permission::ALL).map_err(failed)?;
+        self.code_writes = Some(hook_code(&mut self.engine).map_err(failed)?);
+        self.engine.ctl_flush_tb().map_err(failed)
+    }
+
+    /// Once all of the CCM SRAM is protected nothing needs to tell of writes: with such a hook the emulator looks for one at each access of any memory, which
+    /// takes a third longer.
+    fn close_code(&mut self) -> Result<()> {
+        if !self.machine().chip.system.is_all_protected() {
+            return Ok(());
+        }
+        let Some(hook) = self.code_writes.take() else { return Ok(()) };
+        let closed = self.engine.remove_hook(hook).and_then(|()| {
+            self.engine.mem_protect(CCM.0.into(), CCM.1 as usize, Permission::READ | Permission::EXEC)?;
+            self.engine.ctl_flush_tb()
+        });
+        closed.map_err(failed)
+    }
+
     /// A reset with these flags of its cause.
     pub fn reset(&mut self, cause: u32) -> Result<()> {
         self.machine_mut().reset(cause);
+        self.open_code()?;
         self.begin()
     }
 
@@ -223,6 +258,7 @@ impl Cpu {
             if self.machine().wants_interrupt() && self.take_interrupt()? {
                 continue;
             }
+            self.close_code()?;
             self.machine_mut().stop = None;
             let from = u64::from(self.get(R::PC)? | 1);
             let outcome = self.engine.emu_start(from, u64::from(u32::MAX), 0, 0);
@@ -357,8 +393,17 @@ impl Cpu {
     }
 }
 
-/// The emulator tells of every basic block, of exceptions, of accesses to nowhere, and of writes to code in the CCM SRAM if the image has any.
-fn hook(engine: &mut Unicorn<'static, Machine>, has_ccm: bool) -> Result<(), uc_error> {
+/// The emulator tells of writes to code in the CCM SRAM.
+fn hook_code(engine: &mut Unicorn<'static, Machine>) -> Result<UcHookId, uc_error> {
+    let last = u64::from(CCM.0 + CCM.1 - 1);
+    engine.add_mem_hook(HookType::MEM_WRITE, CCM.0.into(), last, |engine, _, address, _, _| {
+        engine.get_data_mut().write_code(address as u32);
+        true
+    })
+}
+
+/// The emulator tells of every basic block, of exceptions, and of accesses to nowhere or to what is protected.
+fn hook(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
     let mut costs = FxHashMap::default();
     engine.add_block_hook(1, 0, move |engine, address, size| {
         let code = || engine.mem_read_as_vec(address, size as usize).unwrap_or_default();
@@ -377,19 +422,16 @@ fn hook(engine: &mut Unicorn<'static, Machine>, has_ccm: bool) -> Result<(), uc_
         engine.get_data_mut().stop = Some(stop);
         let _ = engine.emu_stop();
     })?;
-    if has_ccm {
-        let last = u64::from(CCM.0 + CCM.1 - 1);
-        engine.add_mem_hook(HookType::MEM_WRITE, CCM.0.into(), last, |engine, _, address, _, _| {
-            engine.get_data_mut().write_code(address as u32);
-            true
-        })?;
-    }
     engine.add_mem_hook(HookType::MEM_INVALID, 1, 0, |engine, kind, address, size, _| {
-        engine
-            .get_data_mut()
-            .findings
-            .add(format!("{kind:?} of {size} bytes at {address:#010x}, where nothing is"));
-        false
+        let machine = engine.get_data_mut();
+        let is_code = kind == MemType::WRITE_PROT && is_ccm(address as u32);
+        if is_code {
+            machine.write_code(address as u32);
+        } else {
+            machine.findings.add(format!("{kind:?} of {size} bytes at {address:#010x}, where nothing is"));
+        }
+        // Such a write comes to nothing, and the program goes on.
+        is_code
     })?;
     Ok(())
 }

@@ -111,13 +111,18 @@ fn writes(of: &[(u32, u32)]) -> Vec<u32> {
     words
 }
 
-/// The first offence of a program that writes these words, told; `traced` by its instruction.
-fn offence(of: &[(u32, u32)], traced: bool) -> Finding {
+/// The processor before a program that writes these words.
+fn before(of: &[(u32, u32)]) -> Cpu {
     let mut words = vec![0; VECTORS];
     (words[0], words[1]) = (0x2000_1000, 0x0800_0001 + PROGRAM);
     words.extend(writes(of));
     let settings = Settings::new(Path::new(""), System::Pmasynrm, "1 end".to_owned());
-    let mut cpu = Cpu::new(&Image::of(&words), machine(&settings).unwrap()).unwrap();
+    Cpu::new(&Image::of(&words), machine(&settings).unwrap()).unwrap()
+}
+
+/// The first offence of a program that writes these words, told; `traced` by its instruction.
+fn offence(of: &[(u32, u32)], traced: bool) -> Finding {
+    let mut cpu = before(of);
     if traced {
         cpu.trace().unwrap();
     }
@@ -126,6 +131,21 @@ fn offence(of: &[(u32, u32)], traced: bool) -> Finding {
     let findings = &cpu.machine().findings.all;
     assert!(outcome.is_ok() || !findings.is_empty(), "{outcome:?}");
     findings.first().unwrap_or_else(|| panic!("nothing is found of {of:x?}")).clone()
+}
+
+/// All of it protected before the program begins: no hook tells of the write.
+#[test]
+fn a_write_to_code_that_is_all_protected_is_told_and_comes_to_nothing() {
+    let place = CCM.0 + 0x400;
+    let mut cpu = before(&[(place, 1)]);
+    for (address, value) in [(0x4002_1060, 1), (0x4001_0020, u32::MAX)] {
+        cpu.machine_mut().write(address, 4, value);
+    }
+    cpu.run(20 * MICROSECOND).unwrap();
+    let findings = &cpu.machine().findings.all;
+    let [finding] = &findings[..] else { panic!("{findings:?}") };
+    assert!(finding.text.ends_with("page 1, which is protected"), "{}", finding.text);
+    assert_ne!(cpu.word(place).unwrap(), 1);
 }
 
 #[test]
