@@ -80,11 +80,11 @@ fn device_drop(link_v: f64, current_a: f64) -> String {
     format!(" --device-drop {:.6},{:.6},{:.6},{:.6}", 2.0 * volts, 5.0 * ohms, 1.5 * volts, 3.0 * ohms)
 }
 
-/// Devices' thresholds beside the dead time: the bounds hold, and each is told, by the mean of three seeds; the slope is resistance.
+/// Devices' thresholds beside the dead time: the bounds hold, and each is told, by the mean of eight seeds; the slope is resistance.
 #[test]
 fn the_devices_thresholds_are_told_from_the_dead_time() {
     let reference = "pmasynrm-180kw";
-    let cases: Vec<_> = (1..=3).map(|seed| (reference, FLAWS, seed)).collect();
+    let cases: Vec<_> = (1..=8).map(|seed| (reference, FLAWS, seed)).collect();
     let others = EVERY.into_iter().skip(1).map(|(name, flaws)| (name, flaws, 1));
     let cases: Vec<_> = cases.into_iter().chain(others).collect();
     let off_v: Vec<_> = cases.par_iter().map(|case| (case.0, thresholds_off_v(*case))).collect();
@@ -92,6 +92,7 @@ fn the_devices_thresholds_are_told_from_the_dead_time() {
     let own: Vec<_> = off_v.iter().filter(|(name, _)| *name == reference).map(|(_, off_v)| off_v).collect();
     for case in 0..2 {
         let mean_v = own.iter().map(|off_v| off_v[case]).sum::<f64>() / own.len() as f64;
+        println!("{mean_v}");
         assert!(mean_v.abs() < 0.9, "{own:?}");
     }
 }
