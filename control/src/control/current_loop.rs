@@ -59,7 +59,7 @@
 
 use super::disturbance::Observer;
 use super::{Committed, ModeLimits, RotorSample, Target};
-use crate::frames::{Angle, Dq, SinCos};
+use crate::frames::{Angle, Dq, SinCos, root};
 
 /// The part of a voltage command that the modulator's mode can follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -192,7 +192,12 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
     };
     let direct = |reference: Dq| {
         let (mean, disturbance) = mean_voltage(input, reference, gains);
-        (mean + resistive - disturbance, steady - disturbance, limit * TRANSIENT_REACH)
+        let (beside, reach) = (resistive - disturbance, limit * TRANSIENT_REACH);
+        let holding = || input.ahead.flux.j() * input.omega + beside;
+        let wanted = mean + resistive - disturbance;
+        // Of more than there is at every angle the modulator takes what there is, in the same direction.
+        let vector = if input.limits.index_limit > 1.0 { wanted } else { straight(wanted, holding, reach) };
+        (vector, steady - disturbance, reach)
     };
     let (regulated, steady, reach) = match input.limits.follows {
         Regulated::Mean => direct(reference),
@@ -206,6 +211,25 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
         voltage: Voltage::fitted(regulated, reach, fills),
         steady: Voltage::fitted(steady, limit, fills),
     }
+}
+
+/// The voltage that is `wanted`, or as much of the way to it from the one that is `holding` the flux linkage where it is as `reach_v` allows: the flux
+/// so goes straight to its reference, only more slowly. A shorter voltage of the same direction would let the rotor turn away from it meanwhile, and
+/// a machine without magnets that lets go of its torque at twice the speed where it weakens takes 1.3 times its current on that way.
+#[inline(always)]
+fn straight(wanted: Dq, holding: impl Fn() -> Dq, reach_v: f32) -> Dq {
+    let beyond = reach_v * reach_v;
+    if wanted.squared() <= beyond {
+        return wanted;
+    }
+    let holding = holding();
+    let square = holding.squared();
+    if square >= beyond {
+        return wanted;
+    }
+    let way = wanted - holding;
+    let (length, along) = (way.squared(), holding.dot(way));
+    holding + way * ((root(along * along + length * (beyond - square)) - along) / length)
 }
 
 /// The flux linkage that a pattern can hold where the operating point's voltage is more than it has: that of as much voltage as there is, in
@@ -273,5 +297,71 @@ impl Voltage {
         } else {
             Self { vector: vector * (limit_v / length_v), length_v: limit_v }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Region;
+    use super::*;
+
+    const OMEGA: f32 = 1_000.0;
+    const LIMIT_V: f32 = 500.0;
+
+    /// The voltage for a reference, of flux linkage that is seen, both in Wb, on a limit in V.
+    fn voltage(flux: Dq, reference: Dq, limit_v: f32) -> Dq {
+        let at_rest = Angle::ZERO.sin_cos();
+        let sample = RotorSample { frame: at_rest, current: Dq::default(), flux };
+        let committed = Committed { horizon_s: 0.0, volt_seconds: None, ripple_wb: None, interval_s: 50e-6 };
+        let limits = ModeLimits {
+            follows: Regulated::Mean,
+            index_limit: 0.9,
+            steady_limit: 0.9,
+            filled: false,
+            ripple_share: 0.05,
+            settled: true,
+        };
+        let target = Target {
+            torque_nm: 0.0,
+            current: Dq::default(),
+            flux: reference,
+            region: Region::Mtpa,
+            modulation_index: 0.5,
+            voltage_limit_v: limit_v,
+        };
+        let disturbance = Observer::new();
+        let input = Input {
+            ahead: &ahead(&sample, at_rest, &committed, &disturbance, 0.0),
+            disturbance: &disturbance,
+            target: &target,
+            omega: OMEGA,
+            committed: &committed,
+            limits: &limits,
+            resistance: 0.0,
+        };
+        step(&input, &Gains::DEFAULT).voltage.vector
+    }
+
+    /// A reference that is far away is approached on a straight line, with all the voltage that there is.
+    #[test]
+    fn the_flux_goes_straight_where_the_voltage_is_limited() {
+        let (flux, reach_v) = (Dq { d: 0.1, q: -0.45 }, LIMIT_V * TRANSIENT_REACH);
+        for reference in [Dq::default(), Dq { d: 0.1, q: 0.45 }, Dq { d: -0.3, q: -0.2 }] {
+            let vector = voltage(flux, reference, LIMIT_V);
+            assert!((vector.length() / reach_v - 1.0).abs() < 1e-5, "{vector:?}");
+            let (way, moves) = (reference - flux, vector - flux.j() * OMEGA);
+            let across = moves.dot(way.j()) / (moves.length() * way.length());
+            assert!(across.abs() < 0.03 && moves.dot(way) > 0.0, "{reference:?}: {vector:?}, {across}");
+        }
+    }
+
+    /// Where what holds the flux is beyond the limit, or nothing is, the direction of the voltage that is wanted stays.
+    #[test]
+    fn a_voltage_keeps_its_direction_where_no_straight_way_is_left() {
+        let (flux, reference) = (Dq { d: 0.1, q: -0.6 }, Dq { d: 0.1, q: -0.55 });
+        let (free, limited) = (voltage(flux, reference, 1e5), voltage(flux, reference, LIMIT_V));
+        let across = free.dot(limited.j()) / (free.length() * limited.length());
+        assert!(across.abs() < 1e-6 && (limited.length() - LIMIT_V * TRANSIENT_REACH).abs() < 0.01);
+        assert_eq!(voltage(flux, reference, 1e6), free, "there is enough");
     }
 }
