@@ -355,7 +355,7 @@ mod tests {
         }
     }
 
-    /// Where what holds the flux is beyond the limit, or nothing is, the direction of the voltage that is wanted stays.
+    /// A voltage that cannot go straight, as what holds the flux is beyond the limit, or that is within it, is as it was.
     #[test]
     fn a_voltage_keeps_its_direction_where_no_straight_way_is_left() {
         let (flux, reference) = (Dq { d: 0.1, q: -0.6 }, Dq { d: 0.1, q: -0.55 });
