@@ -192,10 +192,11 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
     };
     let direct = |reference: Dq| {
         let (mean, disturbance) = mean_voltage(input, reference, gains);
-        let (beside, reach) = (resistive - disturbance, limit * TRANSIENT_REACH);
-        let holding = || input.ahead.flux.j() * input.omega + beside;
+        let reach = limit * TRANSIENT_REACH;
+        let holding = || input.ahead.flux.j() * input.omega + (resistive - disturbance);
         let wanted = mean + resistive - disturbance;
-        // Of more than there is at every angle the modulator takes what there is, in the same direction.
+        // Of more than there is at every angle the modulator takes what there is, in the same direction: going straight there cost the ZS9's motors 55 N·m on a map that is
+        // 20 % off, of 54 that its campaign allows.
         let vector = if input.limits.index_limit > 1.0 { wanted } else { straight(wanted, holding, reach) };
         (vector, steady - disturbance, reach)
     };
@@ -215,7 +216,7 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
 
 /// The voltage that is `wanted`, or as much of the way to it from the one that is `holding` the flux linkage where it is as `reach_v` allows: the flux
 /// so goes straight to its reference, only more slowly. A shorter voltage of the same direction would let the rotor turn away from it meanwhile, and
-/// a machine without magnets that lets go of its torque at twice the speed where it weakens takes 1.3 times its current on that way.
+/// a machine without magnets that reverses its torque just above the speed where it weakens takes 1.3 times its steady current on that way.
 #[inline(always)]
 fn straight(wanted: Dq, holding: impl Fn() -> Dq, reach_v: f32) -> Dq {
     let beyond = reach_v * reach_v;
@@ -313,14 +314,6 @@ mod tests {
         let at_rest = Angle::ZERO.sin_cos();
         let sample = RotorSample { frame: at_rest, current: Dq::default(), flux };
         let committed = Committed { horizon_s: 0.0, volt_seconds: None, ripple_wb: None, interval_s: 50e-6 };
-        let limits = ModeLimits {
-            follows: Regulated::Mean,
-            index_limit: 0.9,
-            steady_limit: 0.9,
-            filled: false,
-            ripple_share: 0.05,
-            settled: true,
-        };
         let target = Target {
             torque_nm: 0.0,
             current: Dq::default(),
@@ -336,7 +329,7 @@ mod tests {
             target: &target,
             omega: OMEGA,
             committed: &committed,
-            limits: &limits,
+            limits: &ModeLimits::CARRIER,
             resistance: 0.0,
         };
         step(&input, &Gains::DEFAULT).voltage.vector

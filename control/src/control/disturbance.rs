@@ -105,7 +105,7 @@ impl Observer {
 mod tests {
     extern crate std;
 
-    use super::super::{Committed, ModeLimits, Region, Regulated, Target, current_loop};
+    use super::super::{Committed, ModeLimits, Region, Target, current_loop};
     use super::*;
     use std::vec::Vec;
 
@@ -131,14 +131,6 @@ mod tests {
             let none = Some(AlphaBeta::default());
             let committed =
                 Committed { horizon_s: 0.0, volt_seconds: none, ripple_wb: None, interval_s: HALF_S };
-            let limits = ModeLimits {
-                follows: Regulated::Mean,
-                index_limit: 0.9,
-                steady_limit: 0.9,
-                filled: false,
-                ripple_share: 0.05,
-                settled: true,
-            };
             let target = Target {
                 torque_nm: 0.0,
                 current: Dq::default(),
@@ -154,7 +146,7 @@ mod tests {
                     target: &target,
                     omega: 0.0,
                     committed: &committed,
-                    limits: &limits,
+                    limits: &ModeLimits::CARRIER,
                     resistance: 0.0,
                 },
                 &Gains::DEFAULT,

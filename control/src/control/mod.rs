@@ -97,6 +97,19 @@ pub struct ModeLimits {
     pub settled: bool,
 }
 
+#[cfg(test)]
+impl ModeLimits {
+    /// A carrier's, for tests of the loop.
+    const CARRIER: Self = Self {
+        follows: Regulated::Mean,
+        index_limit: 0.9,
+        steady_limit: 0.9,
+        filled: false,
+        ripple_share: 0.05,
+        settled: true,
+    };
+}
+
 /// The voltages that the modulator has already committed itself to, seen from the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
