@@ -111,7 +111,7 @@ fn try_tables(good: &'static Tables, check: impl Fn(&Tables) -> Result<(), Refus
     try_all(*good, "ratings.iron.", iron, |tables| &mut tables.ratings.iron, check);
     #[allow(dead_code, reason = "for the compiler to see that no table is left out")]
     fn is_whole(Tables { name: _, ratings: _, flux: _, mtpa, weakening }: Tables) {
-        let Mtpa { universal: _, parameters: _, start: _ } = mtpa;
+        let Mtpa { universal: _, parameters: _, start: _, curvature: _ } = mtpa;
         let Weakening { currents: _, torque: _, flux_knee_wb: _, share_knee: _ } = weakening;
     }
     let knees: [Field<Weakening, f32>; 2] =
@@ -122,6 +122,7 @@ fn try_tables(good: &'static Tables, check: impl Fn(&Tables) -> Result<(), Refus
     try_grid(good, "weakening.currents.", |tables| &mut tables.weakening.currents, check);
     try_curve(good, "mtpa.universal.", |tables| &mut tables.mtpa.universal, check);
     try_curve(good, "mtpa.start.", |tables| &mut tables.mtpa.start, check);
+    try_curve(good, "mtpa.curvature.", |tables| &mut tables.mtpa.curvature, check);
     try_curve(good, "weakening.torque.", |tables| &mut tables.weakening.torque, check);
 }
 

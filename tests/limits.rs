@@ -436,6 +436,7 @@ fn aimed_share(share: f32) -> f32 {
         steady_limit: 1.0,
         filled: false,
         ripple_share: 0.05,
+        ripple_s2: None,
         settled: true,
     };
     let turns = 4_000.0 / 60.0 * tables.ratings.pole_pairs * 1e-4;

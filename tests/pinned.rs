@@ -73,6 +73,7 @@ impl Walk {
             steady_limit: 0.9 * 0.95,
             filled: false,
             ripple_share: 0.05,
+            ripple_s2: None,
             settled: true,
         };
         Self {

@@ -1,7 +1,7 @@
 //! Every fault, by name, with value and limit, and the gates in the safe state in the same interrupt.
 
 use tractive::built_in::traction::BUILT_IN;
-use tractive::control::{ControlLaw, Controller, Demand, Measurements};
+use tractive::control::{ControlLaw, Controller, Demand, Measurements, SpeedTracker};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
 use tractive::modulation::{CarrierHalf, Mode, Schedule, SwitchLimits};
@@ -653,6 +653,8 @@ fn a_task_goes_by_what_it_was_set_up_with() {
     let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
     control.set_up(settings, Instant(5_000));
     assert_eq!(control.next_call(), Instant(5_000));
-    control.set_law(Controller::with_tracking(123.0));
+    let mut law = Controller::new();
+    *law.tracker_mut() = SpeedTracker::with_natural(123.0);
+    control.set_law(law);
     assert_eq!(control.law_mut().tracker().natural_rad_s(), 123.0);
 }

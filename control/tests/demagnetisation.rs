@@ -163,6 +163,7 @@ fn references_keep_the_limit_on_their_way_as_well() {
         steady_limit: 1.0,
         filled,
         ripple_share: 0.05,
+        ripple_s2: None,
         settled,
     };
     let ways = [
@@ -198,6 +199,7 @@ fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
         steady_limit: 0.9,
         filled: false,
         ripple_share: 0.05,
+        ripple_s2: None,
         settled: true,
     };
     let clock = Clock::new(25_000_000, 2_500);

@@ -124,6 +124,7 @@ const LIMITS: ModeLimits = ModeLimits {
     steady_limit: 0.906,
     filled: false,
     ripple_share: 0.05,
+    ripple_s2: None,
     settled: true,
 };
 

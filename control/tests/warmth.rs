@@ -25,6 +25,7 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
         steady_limit: 1.0,
         filled: false,
         ripple_share: 0.05,
+        ripple_s2: None,
         settled: true,
     };
     let volt_seconds = Some(AlphaBeta::default());

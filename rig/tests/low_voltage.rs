@@ -139,6 +139,20 @@ fn the_trip_leaves_the_ripple_its_room() {
     assert_eq!(Machine::load(usual.path().to_str().unwrap()).unwrap().folder.parameters.trip_current_a, 39.0);
 }
 
+/// The ripple of few pulses on a map that saturates to a half and less has a torque of its own, and a drop in the resistance that is none of the mean current's. Neither
+/// foreseen, torque was 1.3, 2.0, 0.9 and 19 % off, of the third after a catch 3.8 %.
+#[test]
+fn a_large_ripple_on_a_saturated_map_keeps_the_mean_torque() {
+    [
+        ("--pole-pairs 2 --rs 0.186 --ld 0.71e-3 --lq 2.95e-3 --psi-f 0.141 --saturation 0.5 --max-current 182 --udc 750 --max-speed-rpm 6315 --max-switching-hz 4000", "reversal"),
+        ("--pole-pairs 7 --rs 0.0867 --ld 0.177e-3 --lq 0.865e-3 --psi-f 0.0059 --saturation 0.4 --max-current 23.2 --udc 96 --max-speed-rpm 5442 --max-switching-hz 16000", "reversal"),
+        ("--pole-pairs 2 --rs 0.0136 --ld 0.156e-3 --lq 0.689e-3 --psi-f 0.03 --saturation 0.4 --max-current 200 --udc 96 --max-speed-rpm 5621 --max-switching-hz 900", "restart"),
+        ("--pole-pairs 2 --rs 0.0286 --ld 0.115e-3 --lq 0.197e-3 --psi-f 0.00752 --saturation 0.4 --max-current 61.7 --udc 48 --max-speed-rpm 24524 --max-switching-hz 4000", "reversal"),
+    ]
+    .par_iter()
+    .for_each(|(values, scenario)| keeps_its_bounds(values, &[(scenario, 2)]));
+}
+
 /// A machine of reluctance alone has its torque reversed and taken away in weakening with no more than its current: its flux linkage goes straight where the voltage has no room,
 /// and does not stay behind the rotor. It took 1.33 and 1.30 of its largest steady current.
 #[test]

@@ -1,7 +1,7 @@
 //! The true optimum on the smooth map: the least current for a torque.
 
 use crate::{Parameters, SmoothMap};
-use libm::{asin, cos, sin};
+use libm::{asin, cos, hypot, sin};
 
 /// Searches on the smooth map.
 pub struct Optimum<'a> {
@@ -32,6 +32,23 @@ impl<'a> Optimum<'a> {
     pub fn torque_nm(&self, id_a: f64, iq_a: f64) -> f64 {
         let at = self.map.at(id_a, iq_a);
         self.factor * (at.psi_d_wb * iq_a - at.psi_q_wb * id_a)
+    }
+
+    /// By how much the mean torque over a flux ripple exceeds the torque at a current, in N·m/Wb², over the ripple's mean square along the flux
+    /// linkage and across it; taken over `ripple_wb` either way. Nothing where there is no flux linkage, or a map that ends before.
+    pub fn curvature(&self, (id_a, iq_a): (f64, f64), ripple_wb: f64) -> [f64; 2] {
+        let at = self.map.at(id_a, iq_a);
+        let size_wb = hypot(at.psi_d_wb, at.psi_q_wb);
+        let (along, here_nm) = ((at.psi_d_wb / size_wb, at.psi_q_wb / size_wb), self.torque_nm(id_a, iq_a));
+        let moved_nm = |(d, q): (f64, f64), by_wb: f64| {
+            let (d, q) = (at.psi_d_wb + by_wb * d, at.psi_q_wb + by_wb * q);
+            let (id, iq) = self.map.inverse(d, q, (id_a, iq_a))?;
+            Some(self.factor * (d * iq - q * id))
+        };
+        [along, (-along.1, along.0)].map(|way| {
+            let ends_nm = moved_nm(way, ripple_wb).zip(moved_nm(way, -ripple_wb));
+            ends_nm.map_or(0.0, |(forth, back)| (0.5 * (forth + back) - here_nm) / (ripple_wb * ripple_wb))
+        })
     }
 
     /// The most torque of a current magnitude, and its angle from the q axis towards −d, in rad.

@@ -15,6 +15,7 @@ pub fn rust_source(tables: &Tables, types: &str) -> String {
     let parameters = grid(&mut out, "MTPA_PARAMETERS", &mtpa.parameters);
     let universal = curve(&mut out, "MTPA_UNIVERSAL", &mtpa.universal);
     let start = curve(&mut out, "MTPA_START", &mtpa.start);
+    let curvature = curve(&mut out, "MTPA_CURVATURE", &mtpa.curvature);
     let currents = grid(&mut out, "WEAKENING_CURRENTS", &weakening.currents);
     let torque = curve(&mut out, "WEAKENING_TORQUE", &weakening.torque);
     let (flux_knee_wb, share_knee) = (weakening.flux_knee_wb, weakening.share_knee);
@@ -31,6 +32,7 @@ pub static BUILT_IN: Tables = Tables {{
         universal: {universal},
         parameters: {parameters},
         start: {start},
+        curvature: {curvature},
     }},
     weakening: Weakening {{
         currents: {currents},

@@ -234,7 +234,7 @@ const fn check_flux(flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refused> {
 }
 
 const fn check_mtpa(mtpa: &Mtpa, flux: &Grid<2>, ratings: &Ratings) -> Result<(), Refused> {
-    let Mtpa { universal, parameters, start } = mtpa;
+    let Mtpa { universal, parameters, start, curvature } = mtpa;
     let Curve { first, inverse_step, nodes: values } = *universal;
     let axis = Axis {
         names: ["mtpa.universal.first", "mtpa.universal.inverse_step", "mtpa.universal.nodes"],
@@ -261,7 +261,12 @@ const fn check_mtpa(mtpa: &Mtpa, flux: &Grid<2>, ratings: &Ratings) -> Result<()
         last: ((1.0 - ROUNDING) * ratings.max_torque_nm, 1.2 * ratings.max_torque_nm),
     };
     checked!(axis.check(first, inverse_step, values.len()));
-    nodes("mtpa.start.nodes", values, values.len(), f32::MIN)
+    checked!(nodes("mtpa.start.nodes", values, values.len(), f32::MIN));
+    let Curve { first, inverse_step, nodes: values } = *curvature;
+    checked!(near("mtpa.curvature.first", first, start.first, 0.0));
+    checked!(near("mtpa.curvature.inverse_step", inverse_step, start.inverse_step, 0.0));
+    checked!(near("mtpa.curvature.nodes", values.len() as f32, start.nodes.len() as f32, 0.0));
+    nodes("mtpa.curvature.nodes", values, values.len(), f32::MIN)
 }
 
 /// Flux linkage at a position of a weakening table's axis.

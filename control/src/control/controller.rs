@@ -76,9 +76,9 @@ pub struct AimInput<'a> {
     pub limits: &'a ModeLimits,
 }
 
-/// The control law's state between two control periods.
+/// The control law's state between two control periods; of a drive whose samples have the ripple of their currents, unless `RIPPLE` is `false`.
 #[derive(Clone, Copy, Debug)]
-pub struct Controller {
+pub struct Controller<const RIPPLE: bool = true> {
     speed: SpeedTracker,
     demand: demand::Shaper,
     disturbance: disturbance::Observer,
@@ -103,12 +103,16 @@ impl Controller {
     pub const fn new() -> Self {
         Self::with_tracker(SpeedTracker::new())
     }
+}
 
-    /// The same with a speed tracker of this natural frequency, in rad/s.
+impl Controller<false> {
+    /// The same for a drive that samples where the ripple of its currents is nothing, with a speed tracker of this natural frequency, in rad/s.
     pub const fn with_tracking(natural_rad_s: f32) -> Self {
         Self::with_tracker(SpeedTracker::with_natural(natural_rad_s))
     }
+}
 
+impl<const RIPPLE: bool> Controller<RIPPLE> {
     const fn with_tracker(speed: SpeedTracker) -> Self {
         Self {
             speed,
@@ -128,7 +132,7 @@ impl Controller {
     }
 }
 
-impl ControlLaw for Controller {
+impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
     #[inline(always)]
     fn tracker(&self) -> &SpeedTracker {
         &self.speed
@@ -199,8 +203,8 @@ impl ControlLaw for Controller {
         let omega = self.speed.omega();
         let turn_rad = 6.0 * omega.abs() * boundary.length_s;
         let sixth = follows == Regulated::Mean && turn_rad < law.gains.sixth_turn_rad;
-        let resistance = self.resistance_ohm(law.tables);
-        let input = disturbance::Input { boundary, sample, omega, resistance, sixth };
+        let drop_v = self.mean_a(sample) * self.resistance_ohm(law.tables);
+        let input = disturbance::Input { boundary, sample, omega, drop_v, sixth };
         self.disturbance.step(&input, law.gains);
     }
 
@@ -221,7 +225,7 @@ impl ControlLaw for Controller {
             modulation_index: limits.steady_limit,
             filled: limits.filled,
         };
-        let trim_nm = self.trim.trim_nm(demand_nm, limits.ripple_share, ratings.max_torque_nm);
+        let (trim_nm, foreseen_nm) = self.trim_nm(demand_nm, limits, udc_v, tables);
         let damping_nm = swing.map_or(0.0, |swing| {
             swing.damping_nm(law.gains.link_damping, demand_nm, omega, ratings.max_torque_nm)
         });
@@ -244,6 +248,7 @@ impl ControlLaw for Controller {
         self.trim.step(&torque_trim::Input {
             demand_nm,
             measured_nm: swing.map_or(measured_nm, |_| measured_nm - (damped_nm - demand_nm)),
+            foreseen_nm,
             limited,
             short: given_nm != demand_nm,
             ripple_share: limits.ripple_share,
@@ -274,7 +279,13 @@ impl ControlLaw for Controller {
         let omega = if limits.ripple_share == 0.0 { self.speed.leading() } else { self.speed.omega() };
         let resistance = self.resistance_ohm(law.tables);
         let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
-        let ahead = current_loop::ahead(sample, half_way, committed, &self.disturbance, resistance);
+        let ahead = current_loop::ahead(
+            sample,
+            half_way,
+            committed,
+            &self.disturbance,
+            self.mean_a(sample) * resistance,
+        );
         let input = current_loop::Input {
             ahead: &ahead,
             disturbance: &self.disturbance,
@@ -282,7 +293,7 @@ impl ControlLaw for Controller {
             omega,
             committed,
             limits,
-            resistance,
+            drop_v: self.target.current * resistance,
         };
         let current_loop::Output { voltage, steady } = current_loop::step(&input, law.gains);
         let regulates_by_pulses = limits.follows.is_direct();
@@ -299,7 +310,7 @@ impl ControlLaw for Controller {
     }
 }
 
-impl Controller {
+impl<const RIPPLE: bool> Controller<RIPPLE> {
     /// Torque that the iron takes, in N·m, of which this share is made up for.
     #[inline(always)]
     fn iron_nm(&self, share: f32, tables: &Tables) -> f32 {
@@ -308,6 +319,24 @@ impl Controller {
         } else {
             share * tables.ratings.iron.torque_nm(self.target.flux.squared(), self.speed.omega())
         }
+    }
+
+    /// By how much the magnitude of a demand is to grow for the mean torque to be it, and the torque of the ripple in that, in N·m.
+    #[inline(always)]
+    fn trim_nm(&self, demand_nm: f32, limits: &ModeLimits, udc_v: f32, tables: &Tables) -> (f32, f32) {
+        let at = (udc_v, self.target.modulation_index);
+        let ripple_nm = torque_trim::ripple_nm(demand_nm, limits.ripple_s2, at, tables);
+        let largest_nm = tables.ratings.max_torque_nm;
+        let learnt_nm = self.trim.trim_nm(demand_nm, ripple_nm, limits.ripple_share, largest_nm);
+        (learnt_nm - ripple_nm, ripple_nm)
+    }
+
+    /// The current without its ripple, in A: where samples have one, the target's. Samples that commands are made of lie at the same places of their
+    /// carriers again and again, and the drop of the ripple there, held until the horizon, turns the flux by a thousandth and more: with inductances
+    /// that saturate to a seventh 3 % of torque.
+    #[inline(always)]
+    fn mean_a(&self, sample: &RotorSample) -> Dq {
+        if RIPPLE { self.target.current } else { sample.current }
     }
 
     /// Mean torque since the last operating point, in N·m, of which the iron takes a part.

@@ -14,10 +14,10 @@
 //! # fn main() -> Result<(), tractive_tablegen::InputError> {
 //! let folder = std::path::Path::new("../tables/pmasynrm-180kw");
 //! let tables = tractive_tablegen::MachineFolder::read(folder)?.tables();
-//! let resistance = tables.ratings.stator_resistance_ohm;
 //! // From 600 to 700 N·m with the rotor at rest at 40°. The next half begins at once and lasts 0.5 ms.
 //! let (now, wanted) = (mtpa(600.0, &tables), mtpa(700.0, &tables));
 //! let reference = flux_linkage(&tables, wanted);
+//! let drop_v = wanted * tables.ratings.stator_resistance_ohm;
 //! let (angle, at_rest, none) = (Angle::from_turns(40.0 / 360.0), Angle::ZERO.sin_cos(), Observer::new());
 //! let sample = RotorSample::new(now.unpark(angle.sin_cos()).abc(), angle, &tables);
 //! let volt_seconds = Some(AlphaBeta::default());
@@ -28,6 +28,7 @@
 //!     # steady_limit: 0.9,
 //!     # filled: false,
 //!     # ripple_share: 0.05,
+//!     # ripple_s2: None,
 //!     # settled: true,
 //!     // …
 //! };
@@ -41,16 +42,16 @@
 //!     // …
 //! };
 //! let input = current_loop::Input {
-//!     ahead: &current_loop::ahead(&sample, at_rest, &committed, &none, resistance),
+//!     ahead: &current_loop::ahead(&sample, at_rest, &committed, &none, drop_v),
 //!     disturbance: &none,
 //!     target: &target,
 //!     omega: 0.0,
 //!     committed: &committed,
 //!     limits: &limits,
-//!     resistance,
+//!     drop_v,
 //! };
 //! let voltage = current_loop::step(&input, &Gains::DEFAULT).voltage.vector;
-//! let flux = sample.flux + (voltage - wanted * resistance) * 0.5e-3;
+//! let flux = sample.flux + (voltage - drop_v) * 0.5e-3;
 //! let left = (flux - reference).length() / (sample.flux - reference).length();
 //! assert!((left - 0.25).abs() < 0.001, "a quarter of the error is left");
 //! # Ok(())
@@ -148,7 +149,7 @@ pub struct Input<'a> {
     pub ahead: &'a Ahead,
     /// The integral part.
     pub disturbance: &'a Observer,
-    /// The operating point: its flux linkage is the reference, and its current's drop in the stator's resistance is fed forward.
+    /// The operating point: its flux linkage is the reference, and its current's drop is fed forward.
     pub target: &'a Target,
     /// Electrical angular speed, in rad/s, signed.
     pub omega: f32,
@@ -156,8 +157,8 @@ pub struct Input<'a> {
     pub committed: &'a Committed,
     /// The limits of the mode.
     pub limits: &'a ModeLimits,
-    /// Stator resistance, in ohm.
-    pub resistance: f32,
+    /// What the target's current takes in the resistance, in V.
+    pub drop_v: Dq,
 }
 
 /// Voltages for the carrier half that begins at the horizon, in V, in the rotor frame that turns with it.
@@ -183,8 +184,7 @@ const TRANSIENT_REACH: f32 = 1.154_7;
 /// One step of the loop.
 pub fn step(input: &Input, gains: &Gains) -> Output {
     let reference = input.target.flux;
-    let resistive = input.target.current * input.resistance;
-    let steady = reference.j() * input.omega + resistive;
+    let steady = reference.j() * input.omega + input.drop_v;
     let limit = input.target.voltage_limit_v;
     let towards = |gain: f32| {
         let steady = steady - input.disturbance.mean();
@@ -193,8 +193,8 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
     let direct = |reference: Dq| {
         let (mean, disturbance) = mean_voltage(input, reference, gains);
         let reach = limit * TRANSIENT_REACH;
-        let holding = || input.ahead.flux.j() * input.omega + (resistive - disturbance);
-        let wanted = mean + resistive - disturbance;
+        let holding = || input.ahead.flux.j() * input.omega + (input.drop_v - disturbance);
+        let wanted = mean + input.drop_v - disturbance;
         // Of more than there is at every angle the modulator takes what there is, in the same direction: going straight there cost the ZS9's motors 55 N·m on a map that is
         // 20 % off, of 54 that its campaign allows.
         let vector = if input.limits.index_limit > 1.0 { wanted } else { straight(wanted, holding, reach) };
@@ -242,7 +242,7 @@ fn held(input: &Input, steady: Dq) -> Dq {
 }
 
 /// The mean voltage of a carrier half that moves the flux from where it is predicted to where it should be, without the
-/// resistive drop.
+/// input.drop_v drop.
 ///
 /// Voltages that hold for a half move the flux along chords, so at the boundaries it stands outside the circle of its
 /// fundamental by x/sin x. The error e goes to (1 − g) e at the half's end, both in the rotor frame that turns by 2x
@@ -260,14 +260,15 @@ fn mean_voltage(input: &Input, reference: Dq, gains: &Gains) -> (Dq, Dq) {
     (chord * (1.0 / committed.interval_s), input.disturbance.voltage(middle))
 }
 
-/// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon.
+/// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon, `drop_v` what the current takes in the
+/// resistance until then.
 #[inline(always)]
 pub fn ahead(
     sample: &RotorSample,
     half_way: SinCos,
     committed: &Committed,
     disturbance: &Observer,
-    resistance: f32,
+    drop_v: Dq,
 ) -> Ahead {
     let on_the_way = sample.frame.turned(half_way);
     let flux = match committed.volt_seconds {
@@ -277,7 +278,7 @@ pub fn ahead(
                 None => volt_seconds,
                 Some(ripple_wb) => volt_seconds - *ripple_wb,
             };
-            let unexplained = disturbance.voltage(on_the_way) - sample.current * resistance;
+            let unexplained = disturbance.voltage(on_the_way) - drop_v;
             // By half the way, and by that once more.
             let back = half_way.back();
             (sample.flux.turned(back) + moved.park(on_the_way) + unexplained * committed.horizon_s)
@@ -324,13 +325,13 @@ mod tests {
         };
         let disturbance = Observer::new();
         let input = Input {
-            ahead: &ahead(&sample, at_rest, &committed, &disturbance, 0.0),
+            ahead: &ahead(&sample, at_rest, &committed, &disturbance, Dq::default()),
             disturbance: &disturbance,
             target: &target,
             omega: OMEGA,
             committed: &committed,
             limits: &ModeLimits::CARRIER,
-            resistance: 0.0,
+            drop_v: Dq::default(),
         };
         step(&input, &Gains::DEFAULT).voltage.vector
     }

@@ -27,7 +27,8 @@ pub struct Input<'a> {
     pub sample: &'a RotorSample,
     /// Electrical, in rad/s.
     pub omega: f32,
-    pub resistance: f32,
+    /// What the current took in the resistance, in V.
+    pub drop_v: Dq,
     /// `true` if the sixth harmonic is slow enough to be followed.
     pub sixth: bool,
 }
@@ -78,7 +79,7 @@ impl Observer {
         if let (Some(last), Some(volt_seconds)) = (self.last_flux, boundary.volt_seconds) {
             let middle = sample.frame.turned(half_turn.back());
             let unexplained = (flux - last - volt_seconds).park(middle) * per_length;
-            self.learn(unexplained + sample.current * input.resistance, middle, input.sixth, gains.observer);
+            self.learn(unexplained + input.drop_v, middle, input.sixth, gains.observer);
         }
         self.last_flux = Some(flux);
     }
@@ -125,8 +126,13 @@ mod tests {
             let sample = RotorSample { frame: at_rest, current: Dq::default(), flux: along_d(flux) };
             let volt_seconds = acted_v.map(|volts: f32| AlphaBeta { alpha: volts * HALF_S, beta: 0.0 });
             let boundary = Boundary { volt_seconds, length_s: HALF_S };
-            let seen =
-                Input { boundary: &boundary, sample: &sample, omega: 0.0, resistance: 0.0, sixth: false };
+            let seen = Input {
+                boundary: &boundary,
+                sample: &sample,
+                omega: 0.0,
+                drop_v: Dq::default(),
+                sixth: false,
+            };
             observer.step(&seen, &Gains::DEFAULT);
             let none = Some(AlphaBeta::default());
             let committed =
@@ -141,13 +147,13 @@ mod tests {
             };
             let output = current_loop::step(
                 &current_loop::Input {
-                    ahead: &current_loop::ahead(&sample, at_rest, &committed, &observer, 0.0),
+                    ahead: &current_loop::ahead(&sample, at_rest, &committed, &observer, Dq::default()),
                     disturbance: &observer,
                     target: &target,
                     omega: 0.0,
                     committed: &committed,
                     limits: &ModeLimits::CARRIER,
-                    resistance: 0.0,
+                    drop_v: Dq::default(),
                 },
                 &Gains::DEFAULT,
             );
@@ -199,8 +205,13 @@ mod tests {
                 current: Dq::default(),
                 flux: Dq { d: flux, q: 0.0 },
             };
-            let seen =
-                Input { boundary: &boundary, sample: &sample, omega: 0.0, resistance: 0.0, sixth: false };
+            let seen = Input {
+                boundary: &boundary,
+                sample: &sample,
+                omega: 0.0,
+                drop_v: Dq::default(),
+                sixth: false,
+            };
             observer.step(&seen, gains);
             observer.mean().d
         };

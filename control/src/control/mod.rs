@@ -93,6 +93,9 @@ pub struct ModeLimits {
     /// Flux ripple of the pattern, as a share of the fundamental flux; zero where the samples do not tell what it does to the torque,
     /// which then is not trimmed.
     pub ripple_share: f32,
+    /// Mean squares of the pattern's flux ripple along the flux linkage and across it, over the square of the link's voltage, in s²; `None` where it does nothing
+    /// to the torque.
+    pub ripple_s2: Option<[f32; 2]>,
     /// The pattern's flux is where it will stay; not while a switch between two patterns is still going on.
     pub settled: bool,
 }
@@ -106,6 +109,7 @@ impl ModeLimits {
         steady_limit: 0.9,
         filled: false,
         ripple_share: 0.05,
+        ripple_s2: None,
         settled: true,
     };
 }

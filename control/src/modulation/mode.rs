@@ -188,11 +188,9 @@ modes! {
     /// Synchronous, 12 carriers per turn.
     Sync12: Row::carrier("sync12", 12, Border::new((74.5, 72.0), (0.88, 0.84)));
     /// Middle 60°, 7 pulses: 18 carriers per turn with one notch each; 4 sin 70° + 2 of equation (17).
-    Mid7: Row::middle60("mid7", 3, 5.758_77, [0.02, 0.0], Border::new((126.0, 121.0), (0.913, 0.885)));
+    Mid7: Row::middle60("mid7", 3, 5.758_77, [0.0, 0.079], Border::new((126.0, 121.0), (0.913, 0.885)));
     /// Middle 60°, 3 pulses: 6 carriers per turn with one notch each; 2 of equation (15).
-    /// Its ripple counts by what it does to the mean torque after seven pulses: a third more at a modulation index of 0.75 than its square alone,
-    /// by the 180 kW machine's map at half torque, which is 26 N·m at that switch beyond the ripple band instead of 33.
-    Mid3: Row::middle60("mid3", 1, 2.0, [0.0, 0.66], Border::new((297.0, 290.0), (0.990, 0.978)));
+    Mid3: Row::middle60("mid3", 1, 2.0, [-0.043, 0.68], Border::new((297.0, 290.0), (0.990, 0.978)));
     /// Square wave: 6 carriers per turn without a notch, or with one where a link has jumped and less voltage is asked for.
     Square: Row {
         regulation: Regulation::Angle,
@@ -200,7 +198,7 @@ modes! {
         ..Row::middle60("square", 1, 2.0, [0.0, 0.0], Border::NEVER)
     };
     /// Middle 60°, 5 pulses: 12 carriers per turn with one notch each; 4 sin 75°. Not one of the paper's.
-    Mid5: Row::middle60("mid5", 2, 3.863_703, [0.0, 0.13], Border::new((176.0, 171.0), (0.955, 0.935)));
+    Mid5: Row::middle60("mid5", 2, 3.863_703, [0.0, 0.15], Border::new((176.0, 171.0), (0.955, 0.935)));
     @optimal {
         /// Optimised, 15 pulses.
         Opp15: "opp15", OPP15, Border::new((59.5, 57.0), (0.57, 0.55));

@@ -42,7 +42,7 @@ const RESISTANCE: Plan = Plan {
 };
 
 /// Each part: its name, the words that take it away, and the beginning of the quantity that it counts for.
-const PARTS: [(&str, &str, &str); 12] = [
+const PARTS: [(&str, &str, &str); 13] = [
     ("prediction over committed pulses", "--ablate prediction", "load steps at 200 r/min"),
     ("prediction over committed pulses", "--ablate prediction", "full torque in one step"),
     ("ripple subtracted", "--ablate ripple", "current when the mode changes"),
@@ -52,6 +52,7 @@ const PARTS: [(&str, &str, &str); 12] = [
     ("observer of the disturbance", "--ablate observer", "half as much resistance"),
     ("sixth harmonic in the observer", "--ablate sixth", "dead time of 5 µs"),
     ("that and the pulses' own compensation", "--uncompensated", "dead time of 5 µs"),
+    ("torque of the ripple, foreseen", "--ablate foreseen", "torque when the mode changes"),
     ("trim of mean torque", "--ablate trim", "torque at the characteristic points"),
     ("trim of mean torque", "--ablate trim", "square wave"),
     ("damping of the link", "--ablate damping", "1,200 N·m at 1,900 r/min"),

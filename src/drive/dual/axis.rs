@@ -174,6 +174,7 @@ impl<L: ControlLaw> Axis<L> {
             filled: false,
             // Linear motors: torque does not depend on the ripple.
             ripple_share: 1.0,
+            ripple_s2: None,
             settled: true,
         };
         let law = Law { gains: &settings.gains, clock: &settings.clock, tables };

@@ -24,7 +24,7 @@ pub(super) const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
 /// The ZS9's control task, for a machine and a control law, once a motor.
-pub struct ControlTask<M = &'static Tables, L = Controller> {
+pub struct ControlTask<M = &'static Tables, L = Controller<false>> {
     machine: M,
     settings: Settings,
     axes: [Axis<L>; 2],

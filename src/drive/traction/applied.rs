@@ -6,7 +6,9 @@ use super::six_step_exit::SixStepExit;
 use super::slot::Decision;
 use crate::control::{Boundary, Committed, ModeLimits, Regulated};
 use crate::frames::{AlphaBeta, Angle};
-use crate::modulation::{Mode, Regulation, first_half, index_floor, index_limit, ripple_at, ripple_share};
+use crate::modulation::{
+    Mode, Regulation, first_half, index_floor, index_limit, ripple_at, ripple_share, ripple_squares,
+};
 use crate::time::{Clock, Instant};
 
 /// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
@@ -74,6 +76,7 @@ pub(super) const NO_LIMITS: ModeLimits = ModeLimits {
     steady_limit: 0.0,
     filled: false,
     ripple_share: 1.0,
+    ripple_s2: None,
     settled: true,
 };
 
@@ -103,6 +106,12 @@ pub(super) fn limits(
         steady_limit: exit.open(follows, index_limit, passed_s),
         filled,
         ripple_share: if aliases(mode, settings) { 0.0 } else { ripple_share(trimmed, modulation_index) },
+        ripple_s2: Some(ripple_squares(
+            trimmed,
+            modulation_index,
+            omega.abs(),
+            clock.seconds(devices.shortest_half_ticks as i32),
+        )),
         settled: exit.is_settled(decision),
     }
 }

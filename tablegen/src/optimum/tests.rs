@@ -1,7 +1,7 @@
 //! The least current beside its closed form, on machines without saturation.
 
 use super::*;
-use crate::testing::{IPM, Linear, MOST_A, near};
+use crate::testing::{IPM, Linear, MOST_A, POLE_PAIRS, near};
 use std::f64::consts::FRAC_PI_4;
 
 #[test]
@@ -78,4 +78,27 @@ fn least_current_keeps_the_least_id() {
         near(found_id, id, 1e-5);
         near(found_iq, iq, 1e-5);
     }
+}
+
+/// Without saturation torque over flux linkage is curved by the saliency alone: as the product of both axes, so as much along as it is less across.
+#[test]
+fn the_curvature_is_the_saliencys() {
+    let machine = IPM.folder(&[]);
+    let map = SmoothMap::new(&machine.map);
+    let optimum = Optimum::new(&map, &machine.parameters);
+    for current in [(-8.0, 5.0), (-2.0, 14.0), (0.0, 9.0)] {
+        let (psi_d, psi_q) = IPM.flux_wb(current.0, current.1);
+        let product = psi_d * psi_q / (psi_d * psi_d + psi_q * psi_q);
+        let wanted = 1.5 * f64::from(POLE_PAIRS) * (1.0 / IPM.lq_h - 1.0 / IPM.ld_h) * product;
+        for ripple_wb in [1e-3, 5e-3] {
+            let [along, across] = optimum.curvature(current, ripple_wb);
+            near(along / wanted, 1.0, 1e-4);
+            near(across / wanted, -1.0, 1e-4);
+        }
+    }
+    let mut map = machine.map.clone();
+    map.psi_d_wb.iter_mut().for_each(|psi_d| *psi_d -= IPM.psi_m_wb);
+    let map = SmoothMap::new(&map);
+    let at_rest = Optimum::of(&map, POLE_PAIRS, MOST_A).curvature((0.0, 0.0), 1e-3);
+    assert_eq!(at_rest, [0.0; 2], "no flux linkage");
 }

@@ -26,6 +26,7 @@
 //!     # steady_limit: 0.9,
 //!     # filled: false,
 //!     # ripple_share: 0.05,
+//!     # ripple_s2: None,
 //!     # settled: true,
 //!     // …
 //! };

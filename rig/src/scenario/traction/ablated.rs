@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 use tractive::control::{
     AimInput, Boundary, Committed, ControlLaw, Controller, Gains, Law, ModeLimits, Regulated, RotorSample,
-    SpeedTracker, Target, VoltageVector, flux_linkage,
+    SpeedTracker, Target, VoltageVector,
 };
 use tractive::frames::AlphaBeta;
 use tractive::machine::Tables;
@@ -24,6 +24,8 @@ pub enum Part {
     Observer,
     /// The sixth harmonic in the observer
     Sixth,
+    /// Torque of the ripple, foreseen by the map
+    Foreseen,
     /// Trim of mean torque
     Trim,
     /// Damping of the link behind a line filter
@@ -86,12 +88,8 @@ impl ControlLaw for Ablated {
         self.controller.begin_without_torque();
     }
 
-    /// Told that the torque of the operating point is there, the trim has nothing to add.
     fn observe(&mut self, sample: &RotorSample, tables: &Tables) {
-        let target = self.controller.target();
-        let wanted =
-            RotorSample { current: target.current, flux: flux_linkage(tables, target.current), ..*sample };
-        self.controller.observe(if self.part == Part::Trim { &wanted } else { sample }, tables);
+        self.controller.observe(sample, tables);
     }
 
     fn learn(&mut self, boundary: &Boundary, sample: &RotorSample, follows: Regulated, law: &Law) {
@@ -103,7 +101,13 @@ impl ControlLaw for Ablated {
 
     fn aim(&mut self, input: &AimInput, law: &Law) {
         let gains = self.gains(law.gains);
-        self.controller.aim(input, &Law { gains: &gains, ..*law });
+        let limits = match self.part {
+            Part::Foreseen => ModeLimits { ripple_s2: None, ..*input.limits },
+            // No ripple that tells anything.
+            Part::Trim => ModeLimits { ripple_share: 0.0, ..*input.limits },
+            _ => *input.limits,
+        };
+        self.controller.aim(&AimInput { limits: &limits, ..*input }, &Law { gains: &gains, ..*law });
     }
 
     fn regulate(

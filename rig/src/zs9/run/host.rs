@@ -148,7 +148,7 @@ impl OperatorPort<DualDemands> for Idle<'_, '_, '_> {
 }
 
 /// Both tasks and the cells between them.
-pub struct Tasks<'a, L = Controller> {
+pub struct Tasks<'a, L = Controller<false>> {
     control: ControlTask<&'static Tables, L>,
     pwm: PwmTask,
     shared: Shared<'a>,
