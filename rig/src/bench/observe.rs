@@ -50,6 +50,8 @@ pub struct Limits {
     pub source_v: f64,
     /// Highest speed, in r/min.
     pub speed_rpm: f64,
+    /// Time between two samples, in ticks: what is beyond for less nobody has to see.
+    pub sampled: Tick,
 }
 
 impl Limits {
@@ -60,6 +62,7 @@ impl Limits {
         uc_v: f64::INFINITY,
         source_v: f64::NEG_INFINITY,
         speed_rpm: f64::INFINITY,
+        sampled: 0,
     };
 
     fn holds(&self, now: &Peaks, speed_rpm: f64) -> bool {
@@ -114,6 +117,8 @@ pub struct Observed {
     /// And after that.
     pub after: Peaks,
     limits: Limits,
+    /// The times from which and until which something was beyond its limits last; within them for less than between two samples counts as beyond.
+    beyond: Option<(Tick, Tick)>,
 }
 
 impl Observed {
@@ -128,6 +133,7 @@ impl Observed {
             until: Peaks::default(),
             after: Peaks::default(),
             limits,
+            beyond: None,
         }
     }
 
@@ -137,9 +143,19 @@ impl Observed {
             return;
         }
         if !self.limits.holds(peaks, speed_rpm) {
-            self.makes_a_difference(now);
+            let since = self.beyond_lately(now).unwrap_or(now);
+            self.beyond = Some((since, now));
+            if now - since >= self.limits.sampled {
+                self.makes_a_difference(since);
+            }
         }
         if self.safe.is_some() { &mut self.after } else { &mut self.until }.note(peaks);
+    }
+
+    /// The time since which something is beyond its limits, or was until the last sample.
+    fn beyond_lately(&self, now: Tick) -> Option<Tick> {
+        let (since, until) = self.beyond?;
+        (now.saturating_sub(until) <= self.limits.sampled).then_some(since)
     }
 
     /// The fault makes a difference now.
@@ -152,6 +168,7 @@ impl Observed {
     /// The gates are safe from now on.
     pub fn enters(&mut self, now: Tick, safe: SafeState, stored: Stored) {
         if self.safe.is_none() {
+            self.effect = self.effect.or(self.beyond_lately(now));
             self.safe = Some((now, safe));
             self.stored = stored;
         }
@@ -162,5 +179,35 @@ impl Observed {
         let (safe, _) = self.safe?;
         let effect = self.effect.filter(|effect| *effect <= safe).unwrap_or(self.from);
         Some(safe.saturating_sub(effect))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is shorter than a sampling period nobody has to see; what a trip follows somebody has.
+    #[test]
+    fn a_limit_counts_from_where_a_sample_sees_it() {
+        let limits = Limits { udc_v: (900.0, 2_000.0), current_a: 300.0, sampled: 100, ..Limits::NONE };
+        let observed = |seen: &[(Tick, f64, f64)]| {
+            let mut observed = Observed::new(10, limits);
+            for (now, udc_v, current_a) in seen {
+                observed.note(*now, &Peaks { udc_v: *udc_v, current_a: *current_a, ..Peaks::default() }, 0.0);
+            }
+            observed
+        };
+        for beyond in [(899.9, 0.0), (2_000.1, 0.0), (1_500.0, 301.0), (1_500.0, f64::NAN)] {
+            let at = |now: Tick| (now, beyond.0, beyond.1);
+            let within = |now: Tick| (now, 1_500.0, 0.0);
+            assert_eq!(observed(&[at(20), at(119), within(130)]).effect, None);
+            assert_eq!(observed(&[at(20), within(21), at(122)]).effect, None, "another one");
+            assert_eq!(observed(&[at(20), within(60), at(120)]).effect, Some(20), "{beyond:?}");
+            for (tripped, took) in [(120, 100), (121, 111)] {
+                let mut observed = observed(&[at(20), within(21)]);
+                observed.enters(tripped, SafeState::GatesOff, Stored::default());
+                assert_eq!(observed.ticks_to_safe(), Some(took), "since the last peak, or since the fault");
+            }
+        }
     }
 }
