@@ -108,6 +108,8 @@ impl Walk {
             self.limits.index_limit = random.within(0.7, 1.0);
             self.limits.steady_limit = self.limits.index_limit * random.within(0.9, 1.0);
             self.limits.ripple_share = random.within(0.01, 0.2);
+            self.limits.ripple_s2 =
+                random.is(0.7).then(|| [random.within(0.0, 5e-9), random.within(0.0, 2e-8)]);
             (self.limits.filled, self.limits.settled) = (random.is(0.3), random.is(0.7));
         }
         if random.is(0.002) {

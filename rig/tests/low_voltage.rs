@@ -140,7 +140,7 @@ fn the_trip_leaves_the_ripple_its_room() {
 }
 
 /// The ripple of few pulses on a map that saturates to a half and less has a torque of its own, and a drop in the resistance that is none of the mean current's. Neither
-/// foreseen, torque was 1.3, 2.0, 0.9 and 19 % off, of the third after a catch 3.8 %.
+/// foreseen, torque was 1.3, 2.0, 3.8 and 19 % off.
 #[test]
 fn a_large_ripple_on_a_saturated_map_keeps_the_mean_torque() {
     [

@@ -46,6 +46,9 @@ fn check_switches(line: &str, most_percent: f64, most_nm: f64) {
     assert!(switches.len() >= 6, "{line}: {} switches", switches.len());
     for switch in switches {
         let told = format!("{line}: {switch:?}");
+        // Where the free carrier gives way to a pattern a zero vector may last half as long again, by the phase that the carrier happens to have: with every fourth load or so.
+        let (most_percent, most_nm) =
+            if switch.from == "async" { (2.5, 25.0) } else { (most_percent, most_nm) };
         assert!(switch.excess_percent < most_percent, "{told}");
         assert!(switch.torque_excursion_nm < most_nm, "{told}");
     }
@@ -66,10 +69,9 @@ fn through_field_weakening_into_square_wave() {
 fn at_part_load_too() {
     check_switches("sweep --down --torque-scale 0.5 --patterns optimal", 1.5, 15.0);
     check_switches("sweep --down --torque-scale 0.2 --patterns optimal", 1.5, 15.0);
-    // Where the free carrier gives way to a pattern, a zero vector may last half as long again, by the phase of the carrier: at every fourth load or so, for 16 to 25 N·m.
     for scale in ["0.2", "0.25", "0.3", "0.35"] {
         let line = format!("sweep --down --brake --torque-scale {scale} --udc 1000 --patterns optimal");
-        check_switches(&line, 2.0, 25.0);
+        check_switches(&line, 2.0, 15.0);
     }
 }
 

@@ -34,8 +34,8 @@ impl<'a> Optimum<'a> {
         self.factor * (at.psi_d_wb * iq_a - at.psi_q_wb * id_a)
     }
 
-    /// By how much the mean torque over a flux ripple exceeds the torque at a current, in N·m/Wb², over the ripple's mean square along the flux
-    /// linkage and across it; taken over `ripple_wb` either way. Nothing where there is no flux linkage, or a map that ends before.
+    /// The excess of mean torque over a flux ripple beyond the torque at a current, in N·m/Wb², over the ripple's mean square along the flux linkage and
+    /// across it; taken over `ripple_wb` either way. Zero where there is no flux linkage, or none of the map's currents has that ripple's.
     pub fn curvature(&self, (id_a, iq_a): (f64, f64), ripple_wb: f64) -> [f64; 2] {
         let at = self.map.at(id_a, iq_a);
         let size_wb = hypot(at.psi_d_wb, at.psi_q_wb);

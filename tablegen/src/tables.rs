@@ -13,7 +13,7 @@ const TORQUE_NODES: usize = 125;
 /// Reach of the torque axis over the largest torque, where current allows: room for a trim.
 const TORQUE_ROOM: f64 = 1.06;
 /// Flux ripple over which the torque's curvature is taken, in volts of the link times free carriers: 1.34 times the rms value that such a carrier
-/// leaves at most. Over a ripple that is anywhere in its range alike, that is right to the fourth power.
+/// leaves across the flux linkage at most. Over a ripple that is anywhere in its range alike, that is right to the fourth power.
 const RIPPLE: f64 = 0.03;
 /// Least magnet flux and saliency of the MTPA parameters, as shares of flux and inductance at full torque.
 const REGULAR_SHARE: f64 = 0.02;
@@ -85,7 +85,7 @@ impl BestCurrents {
         self.0.iter().map(node).collect()
     }
 
-    /// `[radial, tangential]`, in N·m/Wb².
+    /// `[along, across]`, in N·m/Wb².
     fn curvature(&self, optimum: &Optimum, parameters: &Parameters) -> Vec<[f32; 2]> {
         let ripple_wb = RIPPLE * parameters.dc_link_nominal_v / parameters.max_switching_hz;
         let node = |best| optimum.curvature(best, ripple_wb).map(|value| value as f32);

@@ -34,11 +34,13 @@ fn every_number_reads_back_as_itself() {
     assert_eq!(numbers(&source, "MTPA_PARAMETERS"), made.mtpa.parameters.nodes.as_flattened());
     assert_eq!(numbers(&source, "MTPA_UNIVERSAL"), made.mtpa.universal.nodes.as_flattened());
     assert_eq!(numbers(&source, "MTPA_START"), made.mtpa.start.nodes.as_flattened());
+    assert_eq!(numbers(&source, "MTPA_CURVATURE"), made.mtpa.curvature.nodes.as_flattened());
     assert_eq!(numbers(&source, "WEAKENING_CURRENTS"), made.weakening.currents.nodes.as_flattened());
     assert_eq!(numbers(&source, "WEAKENING_TORQUE"), made.weakening.torque.nodes.as_flattened());
     let all = [
         made.flux.nodes.as_flattened(),
         made.mtpa.start.nodes.as_flattened(),
+        made.mtpa.curvature.nodes.as_flattened(),
         made.weakening.currents.nodes.as_flattened(),
     ];
     assert!(all.into_iter().flatten().all(|value| value.is_finite()));
@@ -53,7 +55,8 @@ fn lines_are_short_and_tables_small() {
         * (made.flux.nodes.len() + made.mtpa.parameters.nodes.len() + made.weakening.currents.nodes.len())
         + 5 * made.weakening.torque.nodes.len()
         + made.mtpa.universal.nodes.len()
-        + 4 * made.mtpa.start.nodes.len();
+        + 4 * made.mtpa.start.nodes.len()
+        + 2 * made.mtpa.curvature.nodes.len();
     println!("longest line {longest}, tables {} bytes", 4 * nodes);
     assert!(longest <= 130);
     assert!(4 * nodes < 80_000);

@@ -64,6 +64,7 @@ fn told(machine: &str) -> Vec<(String, [f64; 3])> {
     table(&mut out, &name("mtpa.parameters"), parameters.nodes);
     table(&mut out, &name("mtpa.universal"), mtpa.universal.nodes);
     table(&mut out, &name("mtpa.start"), mtpa.start.nodes);
+    table(&mut out, &name("mtpa.curvature"), mtpa.curvature.nodes);
     table(&mut out, &name("weakening.currents"), currents.nodes);
     table(&mut out, &name("weakening.torque"), weakening.torque.nodes);
     out

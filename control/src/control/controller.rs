@@ -275,8 +275,7 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
         limits: &ModeLimits,
         law: &Law,
     ) -> VoltageVector {
-        // Where there is no trim, nothing else makes up for a speed that lags.
-        let omega = if limits.ripple_share == 0.0 { self.speed.leading() } else { self.speed.omega() };
+        let omega = self.speed.leading();
         let resistance = self.resistance_ohm(law.tables);
         let half_way = Angle::within_half_turn(0.5 * omega * committed.horizon_s).sin_cos();
         let ahead = current_loop::ahead(
@@ -325,15 +324,15 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
     #[inline(always)]
     fn trim_nm(&self, demand_nm: f32, limits: &ModeLimits, udc_v: f32, tables: &Tables) -> (f32, f32) {
         let at = (udc_v, self.target.modulation_index);
-        let ripple_nm = torque_trim::ripple_nm(demand_nm, limits.ripple_s2, at, tables);
+        let ripple_s2 = if RIPPLE { limits.ripple_s2 } else { None };
+        let ripple_nm = torque_trim::ripple_nm(demand_nm, ripple_s2, at, tables);
         let largest_nm = tables.ratings.max_torque_nm;
         let learnt_nm = self.trim.trim_nm(demand_nm, ripple_nm, limits.ripple_share, largest_nm);
         (learnt_nm - ripple_nm, ripple_nm)
     }
 
-    /// The current without its ripple, in A: where samples have one, the target's. Samples that commands are made of lie at the same places of their
-    /// carriers again and again, and the drop of the ripple there, held until the horizon, turns the flux by a thousandth and more: with inductances
-    /// that saturate to a seventh 3 % of torque.
+    /// The current in a steady state without its ripple, in A: where samples have one, the target's. Samples that commands are made of lie at the same
+    /// places of their carriers again and again, and the drop of the ripple there, held until the horizon, turns the flux by a thousandth and more.
     #[inline(always)]
     fn mean_a(&self, sample: &RotorSample) -> Dq {
         if RIPPLE { self.target.current } else { sample.current }

@@ -157,7 +157,7 @@ pub struct Input<'a> {
     pub committed: &'a Committed,
     /// The limits of the mode.
     pub limits: &'a ModeLimits,
-    /// What the target's current takes in the resistance, in V.
+    /// The drop of the target's current in the resistance, in V.
     pub drop_v: Dq,
 }
 
@@ -242,7 +242,7 @@ fn held(input: &Input, steady: Dq) -> Dq {
 }
 
 /// The mean voltage of a carrier half that moves the flux from where it is predicted to where it should be, without the
-/// input.drop_v drop.
+/// resistive drop.
 ///
 /// Voltages that hold for a half move the flux along chords, so at the boundaries it stands outside the circle of its
 /// fundamental by x/sin x. The error e goes to (1 − g) e at the half's end, both in the rotor frame that turns by 2x
@@ -260,7 +260,7 @@ fn mean_voltage(input: &Input, reference: Dq, gains: &Gains) -> (Dq, Dq) {
     (chord * (1.0 / committed.interval_s), input.disturbance.voltage(middle))
 }
 
-/// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon, `drop_v` what the current takes in the
+/// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon, `drop_v` the current's drop in the
 /// resistance until then.
 #[inline(always)]
 pub fn ahead(

@@ -27,7 +27,7 @@ pub struct Input<'a> {
     pub sample: &'a RotorSample,
     /// Electrical, in rad/s.
     pub omega: f32,
-    /// What the current took in the resistance, in V.
+    /// The drop of the current in the resistance, in V.
     pub drop_v: Dq,
     /// `true` if the sixth harmonic is slow enough to be followed.
     pub sixth: bool,

@@ -19,10 +19,11 @@ const STEADY_RATE: f32 = 1.0;
 /// Time after a change of the demand in which the current loop is still at work, in s.
 const HOLD_S: f32 = 0.01;
 
-/// Most of a demand that a ripple may add or take: a locked pattern has no known one at a rotor that has stopped. Of sixty random machines 0.14 is the most.
+/// Most of a demand that a ripple may add or take: at a rotor that has just stopped a locked pattern's would have no end. Of sixty random machines 0.14 is the most.
 const MOST_RIPPLE: f32 = 0.17;
 /// Part of six-step by which the MTPA point's voltage exceeds it where no curvature is left: the iron of a machine that weakens saturates less. By the map of the
-/// 180 kW machine, from a quarter of its torque on, 0.83 to 0.56 of the MTPA point's is left at 0.06 to 0.18 beyond, and a tenth at 0.41.
+/// 180 kW machine, from a quarter of its torque on, 0.83 to 0.56 of the MTPA point's is left at 0.06 to 0.18 beyond, and a tenth at 0.41; with the
+/// ripple that is taken to grow along, this has 0.90, 0.56 and nothing there.
 const CURVED_UNTIL: f32 = 0.3;
 
 /// The torque that a flux ripple adds to the magnitude of a demand, in N·m, on a link of `udc_v`, where the MTPA point asks for `modulation_index`; `ripple_s2` as in
@@ -35,7 +36,7 @@ pub fn ripple_nm(
     tables: &Tables,
 ) -> f32 {
     let Some([along_s2, across_s2]) = ripple_s2 else { return 0.0 };
-    let beyond = limit(modulation_index - 1.0, 0.0, CURVED_UNTIL);
+    let beyond = if modulation_index > 1.0 { limit(modulation_index - 1.0, 0.0, CURVED_UNTIL) } else { 0.0 };
     let [along, across] = tables.mtpa.curvature.at(demand_nm.abs());
     let left = (udc_v * udc_v) * (1.0 - beyond * (1.0 / CURVED_UNTIL));
     limit_magnitude((along * along_s2 + across * across_s2) * left, MOST_RIPPLE * demand_nm.abs())

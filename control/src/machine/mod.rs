@@ -94,8 +94,8 @@ pub struct Mtpa {
     /// `[i_d start, i_q start, i_d trim, i_q trim]`, in A, over |T| in N·m (0 ..= largest torque): the
     /// point where the first pass reads `parameters`, and what is added to the second pass' result.
     pub start: Curve<4>,
-    /// `[along, across]`, in N·m/Wb², over |T| likewise: by how much the mean torque over a flux ripple around the MTPA point exceeds the
-    /// torque there, over the ripple's mean square along the flux linkage and across it: half of the torque's second derivatives.
+    /// `[along, across]`, in N·m/Wb², over |T| likewise: the excess of mean torque over a flux ripple around the MTPA point beyond the torque
+    /// there, over the ripple's mean square along the flux linkage and across it: half of the torque's second differences.
     pub curvature: Curve<2>,
 }
 

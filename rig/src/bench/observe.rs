@@ -51,7 +51,7 @@ pub struct Limits {
     /// Highest speed, in r/min.
     pub speed_rpm: f64,
     /// Time between two samples, in ticks: what is beyond for less nobody has to see.
-    pub sampled: Tick,
+    pub sampling_ticks: Tick,
 }
 
 impl Limits {
@@ -62,7 +62,7 @@ impl Limits {
         uc_v: f64::INFINITY,
         source_v: f64::NEG_INFINITY,
         speed_rpm: f64::INFINITY,
-        sampled: 0,
+        sampling_ticks: 0,
     };
 
     fn holds(&self, now: &Peaks, speed_rpm: f64) -> bool {
@@ -117,7 +117,7 @@ pub struct Observed {
     /// And after that.
     pub after: Peaks,
     limits: Limits,
-    /// The times from which and until which something was beyond its limits last; within them for less than between two samples counts as beyond.
+    /// The times from which and until which something was beyond its limits last; back within its limits for less than between two samples it counts as beyond.
     beyond: Option<(Tick, Tick)>,
 }
 
@@ -145,7 +145,7 @@ impl Observed {
         if !self.limits.holds(peaks, speed_rpm) {
             let since = self.beyond_lately(now).unwrap_or(now);
             self.beyond = Some((since, now));
-            if now - since >= self.limits.sampled {
+            if now - since >= self.limits.sampling_ticks {
                 self.makes_a_difference(since);
             }
         }
@@ -155,7 +155,7 @@ impl Observed {
     /// The time since which something is beyond its limits, or was until the last sample.
     fn beyond_lately(&self, now: Tick) -> Option<Tick> {
         let (since, until) = self.beyond?;
-        (now.saturating_sub(until) <= self.limits.sampled).then_some(since)
+        (now.saturating_sub(until) <= self.limits.sampling_ticks).then_some(since)
     }
 
     /// The fault makes a difference now.
@@ -189,7 +189,8 @@ mod tests {
     /// What is shorter than a sampling period nobody has to see; what a trip follows somebody has.
     #[test]
     fn a_limit_counts_from_where_a_sample_sees_it() {
-        let limits = Limits { udc_v: (900.0, 2_000.0), current_a: 300.0, sampled: 100, ..Limits::NONE };
+        let limits =
+            Limits { udc_v: (900.0, 2_000.0), current_a: 300.0, sampling_ticks: 100, ..Limits::NONE };
         let observed = |seen: &[(Tick, f64, f64)]| {
             let mut observed = Observed::new(10, limits);
             for (now, udc_v, current_a) in seen {

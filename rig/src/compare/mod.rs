@@ -8,7 +8,7 @@ mod zs9;
 
 pub use flaws::{FLAW_HEADS, FlawRow, flaws, table as flaws_table};
 pub use outcome::Row;
-pub use parts::{PartRow, parts};
+pub use parts::PartRow;
 
 use crate::files::{make_folder, write_text};
 use crate::machine::Machine;
@@ -22,6 +22,7 @@ use comfy_table::presets::NOTHING;
 use comfy_table::{ContentArrangement, Table};
 use outcome::{Outcome, Outcomes};
 use rayon::prelude::*;
+use rows::Plan;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -54,14 +55,38 @@ pub struct CompareOptions {
 
 /// Runs the rows whose name has each of the words.
 pub fn rows(only: &[String]) -> Result<Vec<Row>> {
+    let plan = planned(only)?;
+    Ok(judged(&plan, &drive(lines(&plan))?, &Machine::load("pmasynrm-180kw")?))
+}
+
+/// Runs our law with its parts taken away one at a time.
+pub fn parts() -> Result<Vec<PartRow>> {
+    let plan = parts::planned()?;
+    Ok(parts::found(&plan, &drive(parts::lines(&plan))?, &Machine::load("pmasynrm-180kw")?))
+}
+
+/// All of [`rows`] and [`parts`], of which many runs are the same.
+pub fn rows_and_parts() -> Result<(Vec<Row>, Vec<PartRow>)> {
+    let (plan, less) = (planned(&[])?, parts::planned()?);
+    let (driven, machine) = (drive(&lines(&plan) | &parts::lines(&less))?, Machine::load("pmasynrm-180kw")?);
+    Ok((judged(&plan, &driven, &machine), parts::found(&less, &driven, &machine)))
+}
+
+fn planned(only: &[String]) -> Result<Vec<&'static Plan>> {
     let mut plan: Vec<_> = rows::ROWS.iter().chain(&zs9::ROWS).collect();
     plan.retain(|row| only.iter().all(|word| row.quantity.contains(word.as_str())));
     anyhow::ensure!(!plan.is_empty(), "--only {}: no row has all of these words", only.join(" "));
-    let lines: BTreeSet<_> = plan.iter().flat_map(|row| (row.lines)()).collect();
-    let driven = drive(lines.iter().flat_map(|line| LAWS.map(|law| format!("{line} {law}"))).collect())?;
-    let machine = Machine::load("pmasynrm-180kw")?;
-    let outcomes = [0, 1].map(|law| Outcomes { law, more: LAWS[law], driven: &driven, machine: &machine });
-    Ok(plan.into_iter().map(|row| row.judge(&outcomes)).collect())
+    Ok(plan)
+}
+
+fn lines(plan: &[&Plan]) -> BTreeSet<String> {
+    let lines = plan.iter().flat_map(|row| (row.lines)());
+    lines.flat_map(|line| LAWS.map(|law| format!("{line} {law}"))).collect()
+}
+
+fn judged(plan: &[&Plan], driven: &BTreeMap<String, Outcome>, machine: &Machine) -> Vec<Row> {
+    let outcomes = [0, 1].map(|law| Outcomes { law, more: LAWS[law], driven, machine });
+    plan.iter().map(|row| row.judge(&outcomes)).collect()
 }
 
 /// Runs command lines side by side, and what came of each.

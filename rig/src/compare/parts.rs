@@ -2,10 +2,10 @@
 
 use super::outcome::{Cell, Outcomes, cell, trips, verdict};
 use super::rows::{Plan, ROWS, words};
-use super::{Outcome, drive};
+use super::{LAWS, Outcome};
 use crate::machine::Machine;
 use anyhow::{Context, Result};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The run that shows what damping is worth: constant power behind a choke.
 const BEHIND_CHOKE: &str = "steady --speed 1900 --torque 1200 --line 3,4,30";
@@ -77,26 +77,34 @@ impl PartRow {
     }
 }
 
-/// Runs all of them.
-pub fn parts() -> Result<Vec<PartRow>> {
-    let mut plan = Vec::new();
-    for (part, less, quantity) in PARTS {
-        let row = ROWS.iter().chain([&DAMPING, &RESISTANCE]).find(|row| row.quantity.starts_with(quantity));
-        plan.push((part, less, row.context(quantity)?));
-    }
-    let wanted = |(_, less, row): &(_, &str, &Plan)| {
-        let lines = (row.lines)().into_iter();
-        lines
-            .flat_map(|line| ["--law tractive", less, "--law pi"].map(|more| format!("{line} {more}")))
-            .collect::<Vec<_>>()
+/// A part's name, the words that take it away, and the row that it counts for.
+type Less = (&'static str, &'static str, &'static Plan);
+
+/// Each part with its row.
+pub(super) fn planned() -> Result<Vec<Less>> {
+    let row = |quantity| {
+        ROWS.iter()
+            .chain([&DAMPING, &RESISTANCE])
+            .find(|row| row.quantity.starts_with(quantity))
+            .context(quantity)
     };
-    let driven = drive(plan.iter().flat_map(wanted).collect())?;
-    let machine = Machine::load("pmasynrm-180kw")?;
-    let row = |(part, less, row): &(&'static str, &str, &'static Plan)| {
-        let found = ["--law tractive", less, "--law pi"].map(|more| read(row, more, &driven, &machine));
+    PARTS.into_iter().map(|(part, less, quantity)| Ok((part, less, row(quantity)?))).collect()
+}
+
+/// The command lines that they take.
+pub(super) fn lines(plan: &[Less]) -> BTreeSet<String> {
+    let lines =
+        plan.iter().flat_map(|(_, less, row)| (row.lines)().into_iter().map(move |line| (line, *less)));
+    lines.flat_map(|(line, less)| [LAWS[0], less, LAWS[1]].map(|more| format!("{line} {more}"))).collect()
+}
+
+/// What came of them.
+pub(super) fn found(plan: &[Less], driven: &BTreeMap<String, Outcome>, machine: &Machine) -> Vec<PartRow> {
+    let row = |(part, less, row): &Less| {
+        let found = [LAWS[0], *less, LAWS[1]].map(|more| read(row, more, driven, machine));
         PartRow { part, quantity: row.quantity, found }
     };
-    Ok(plan.iter().map(row).collect())
+    plan.iter().map(row).collect()
 }
 
 /// A row's cell under a law, or without a part of ours, by the words that the runs had besides.

@@ -203,7 +203,7 @@ impl Drive {
                     parameters.trip_dc_over_v / (1.0 + conditions.flaws.udc_gain),
                 ),
                 speed_rpm: parameters.trip_speed_rpm,
-                sampled: u64::from(CLOCK.control_ticks),
+                sampling_ticks: u64::from(CLOCK.control_ticks),
                 ..Limits::NONE
             },
             dead_time_ticks: conditions.dead_time_ticks,
