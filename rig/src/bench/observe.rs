@@ -186,7 +186,7 @@ impl Observed {
 mod tests {
     use super::*;
 
-    /// What is shorter than a sampling period nobody has to see; what a trip follows somebody has.
+    /// A peak that is shorter than a sampling period nobody has to see; one that a trip follows somebody has.
     #[test]
     fn a_limit_counts_from_where_a_sample_sees_it() {
         let limits =

@@ -20,15 +20,12 @@ use anyhow::{Context, Result};
 use clap::Args;
 use comfy_table::presets::NOTHING;
 use comfy_table::{ContentArrangement, Table};
-use outcome::{Outcome, Outcomes};
+use outcome::{LAWS, Outcome, Outcomes};
 use rayon::prelude::*;
 use rows::Plan;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
-
-/// The laws as words of a command line: the project's own, then the ordinary one.
-const LAWS: [&str; 2] = ["--law tractive", "--law pi"];
 
 /// The heads of the table.
 const HEADS: [&str; 4] = ["", "tractive", "--law pi", "ahead"];

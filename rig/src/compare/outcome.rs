@@ -5,6 +5,9 @@ use crate::machine::Machine;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
+/// The laws as words of a command line: the project's own, then the ordinary one.
+pub(super) const LAWS: [&str; 2] = ["--law tractive", "--law pi"];
+
 /// The end of a run: its figures, and the fault that tripped it.
 pub(super) struct Outcome {
     pub(super) figures: Figures,

@@ -1,8 +1,7 @@
 //! The project's law with its parts taken away one at a time, in the runs where each part counts.
 
-use super::outcome::{Cell, Outcomes, cell, trips, verdict};
+use super::outcome::{Cell, LAWS, Outcome, Outcomes, cell, trips, verdict};
 use super::rows::{Plan, ROWS, words};
-use super::{LAWS, Outcome};
 use crate::machine::Machine;
 use anyhow::{Context, Result};
 use std::collections::{BTreeMap, BTreeSet};
@@ -98,7 +97,7 @@ pub(super) fn lines(plan: &[Less]) -> BTreeSet<String> {
     lines.flat_map(|(line, less)| [LAWS[0], less, LAWS[1]].map(|more| format!("{line} {more}"))).collect()
 }
 
-/// What came of them.
+/// The rows, by what came of the lines.
 pub(super) fn found(plan: &[Less], driven: &BTreeMap<String, Outcome>, machine: &Machine) -> Vec<PartRow> {
     let row = |(part, less, row): &Less| {
         let found = [LAWS[0], *less, LAWS[1]].map(|more| read(row, more, driven, machine));
