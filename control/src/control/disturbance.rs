@@ -115,6 +115,11 @@ mod tests {
     const DISTURBANCE_V: f32 = 20.0;
     const REFERENCE_WB: f32 = 1.0;
 
+    /// Input as it is seen at standstill, without resistance.
+    fn seen<'a>(boundary: &'a Boundary, sample: &'a RotorSample) -> Input<'a> {
+        Input { boundary, sample, omega: 0.0, drop_v: Dq::default(), sixth: false }
+    }
+
     /// The loop at standstill without resistance, on a flux linkage of 0.9 Wb at first: of each half the error in Wb, the voltage that is asked
     /// for without a limit, the voltage that acts and the estimate before it, in V.
     fn driven(halves: usize, limit_v: f32) -> Vec<[f32; 4]> {
@@ -126,13 +131,7 @@ mod tests {
             let sample = RotorSample { frame: at_rest, current: Dq::default(), flux: along_d(flux) };
             let volt_seconds = acted_v.map(|volts: f32| AlphaBeta { alpha: volts * HALF_S, beta: 0.0 });
             let boundary = Boundary { volt_seconds, length_s: HALF_S };
-            let seen = Input {
-                boundary: &boundary,
-                sample: &sample,
-                omega: 0.0,
-                drop_v: Dq::default(),
-                sixth: false,
-            };
+            let seen = seen(&boundary, &sample);
             observer.step(&seen, &Gains::DEFAULT);
             let none = Some(AlphaBeta::default());
             let committed =
@@ -205,13 +204,7 @@ mod tests {
                 current: Dq::default(),
                 flux: Dq { d: flux, q: 0.0 },
             };
-            let seen = Input {
-                boundary: &boundary,
-                sample: &sample,
-                omega: 0.0,
-                drop_v: Dq::default(),
-                sixth: false,
-            };
+            let seen = seen(&boundary, &sample);
             observer.step(&seen, gains);
             observer.mean().d
         };

@@ -10,7 +10,7 @@ use crate::machine::Tables;
 
 /// Bandwidth, in rad/s: the torque ripple at six times the stator frequency must not come through.
 const BANDWIDTH_RAD_S: f32 = 60.0;
-/// Largest trim, as a share of the demand, beyond what is foreseen: all of that may be taken back, as a sensor's filter that smooths the ripple takes its torque.
+/// Largest trim, as a share of the demand, beyond as much as is foreseen, either way: that may have to be taken back whole, as where a sensor's filter smooths the ripple.
 const MOST: f32 = 0.06;
 /// Share of the largest torque below which the trim no longer shrinks with the demand.
 const CONSTANT_BELOW: f32 = 0.4;
@@ -149,7 +149,7 @@ mod tests {
         assert!((learned_nm(910.0, false, false) + 54.0).abs() < 0.01);
         for foreseen_nm in [-30.0, 30.0] {
             let learnt_nm = learned_beyond_nm(foreseen_nm, 920.0, false, false);
-            assert!((learnt_nm + 84.0).abs() < 0.01, "what is foreseen is taken back: {learnt_nm}");
+            assert!((learnt_nm + 84.0).abs() < 0.01, "as much more as is foreseen, either way: {learnt_nm}");
         }
     }
 
