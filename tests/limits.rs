@@ -438,6 +438,7 @@ fn aimed_share(share: f32) -> f32 {
         ripple_share: 0.05,
         ripple_s2: None,
         settled: true,
+        joins: false,
     };
     let turns = 4_000.0 / 60.0 * tables.ratings.pole_pairs * 1e-4;
     let limit = VoltageLimit { udc_v: 1_000.0, modulation_index: 1.0, filled: false };

@@ -75,6 +75,7 @@ impl Walk {
             ripple_share: 0.05,
             ripple_s2: None,
             settled: true,
+            joins: false,
         };
         Self {
             random: Random(u64::from(number) + 1),

@@ -165,6 +165,7 @@ fn references_keep_the_limit_on_their_way_as_well() {
         ripple_share: 0.05,
         ripple_s2: None,
         settled,
+        joins: false,
     };
     let ways = [
         way(Regulated::Mean, false, true),
@@ -201,6 +202,7 @@ fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
         ripple_share: 0.05,
         ripple_s2: None,
         settled: true,
+        joins: false,
     };
     let clock = Clock::new(25_000_000, 2_500);
     let constants = Law { gains: &Gains::DEFAULT, clock: &clock, tables: &limited };

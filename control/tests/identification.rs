@@ -126,6 +126,7 @@ const LIMITS: ModeLimits = ModeLimits {
     ripple_share: 0.05,
     ripple_s2: None,
     settled: true,
+    joins: false,
 };
 
 fn run(machine: &str, flux_scale: f64, sensors: Sensors) -> Outcome {

@@ -30,6 +30,7 @@ fn driven(tables: &Tables, share: f32, (rpm, udc_v): (f32, f32), demand_nm: f32)
         ripple_share: 0.05,
         ripple_s2: None,
         settled: true,
+        joins: false,
     };
     let turns = rpm / 60.0 * tables.ratings.pole_pairs * 1e-4;
     let mut law = Controller::new();

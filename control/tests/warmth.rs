@@ -27,6 +27,7 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
         ripple_share: 0.05,
         ripple_s2: None,
         settled: true,
+        joins: false,
     };
     let volt_seconds = Some(AlphaBeta::default());
     let committed = Committed { horizon_s: 0.0, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };

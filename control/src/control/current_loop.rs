@@ -30,6 +30,7 @@
 //!     # ripple_share: 0.05,
 //!     # ripple_s2: None,
 //!     # settled: true,
+//!     # joins: false,
 //!     // …
 //! };
 //! let target = Target {
@@ -188,6 +189,7 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
     let limit = input.target.voltage_limit_v;
     let towards = |gain: f32| {
         let steady = steady - input.disturbance.mean();
+        let gain = if input.limits.joins { 0.0 } else { gain };
         (steady - (input.ahead.flux - reference) * gain, steady, limit)
     };
     let direct = |reference: Dq| {
@@ -310,8 +312,12 @@ mod tests {
     const OMEGA: f32 = 1_000.0;
     const LIMIT_V: f32 = 500.0;
 
-    /// The voltage for a reference, of flux linkage that is seen, both in Wb, on a limit in V.
+    /// A carrier's voltage for a reference, of flux linkage that is seen, both in Wb, on a limit in V.
     fn voltage(flux: Dq, reference: Dq, limit_v: f32) -> Dq {
+        voltage_of(&ModeLimits::CARRIER, flux, reference, limit_v)
+    }
+
+    fn voltage_of(limits: &ModeLimits, flux: Dq, reference: Dq, limit_v: f32) -> Dq {
         let at_rest = Angle::ZERO.sin_cos();
         let sample = RotorSample { frame: at_rest, current: Dq::default(), flux };
         let committed = Committed { horizon_s: 0.0, volt_seconds: None, ripple_wb: None, interval_s: 50e-6 };
@@ -330,7 +336,7 @@ mod tests {
             target: &target,
             omega: OMEGA,
             committed: &committed,
-            limits: &ModeLimits::CARRIER,
+            limits,
             drop_v: Dq::default(),
         };
         step(&input, &Gains::DEFAULT).voltage.vector
@@ -347,6 +353,19 @@ mod tests {
             let across = moves.dot(way.j()) / (moves.length() * way.length());
             assert!(across.abs() < 0.03 && moves.dot(way) > 0.0, "{reference:?}: {vector:?}, {across}");
         }
+    }
+
+    /// Where a pattern joins the path of another one its voltage is the operating point's.
+    #[test]
+    fn a_pattern_regulates_nothing_where_it_joins() {
+        let (flux, reference) = (Dq { d: 0.1, q: -0.4 }, Dq { d: 0.12, q: -0.39 });
+        let pattern = ModeLimits { follows: Regulated::Fundamental, ..ModeLimits::CARRIER };
+        let off = |joins| {
+            voltage_of(&ModeLimits { joins, ..pattern }, flux, reference, LIMIT_V) - reference.j() * OMEGA
+        };
+        assert_eq!(off(true), Dq::default());
+        let regulated = (reference - flux) * Gains::DEFAULT.pattern_rad_s;
+        assert!((off(false) - regulated).length() < 1e-3, "{:?}, not {regulated:?}", off(false));
     }
 
     /// A voltage that cannot go straight, as what holds the flux is beyond the limit, or that is within it, is as it was.

@@ -98,6 +98,9 @@ pub struct ModeLimits {
     pub ripple_s2: Option<[f32; 2]>,
     /// The pattern's flux is where it will stay; not while a switch between two patterns is still going on.
     pub settled: bool,
+    /// The half is a pattern's first one behind another pattern: it begins where their paths meet, away from its own angle, and what its flux linkage differs by there is
+    /// no error.
+    pub joins: bool,
 }
 
 #[cfg(test)]
@@ -111,6 +114,7 @@ impl ModeLimits {
         ripple_share: 0.05,
         ripple_s2: None,
         settled: true,
+        joins: false,
     };
 }
 

@@ -39,7 +39,7 @@ impl Zeros {
         match self {
             Self::Even => 0.5,
             Self::Early => 0.8,
-            Self::Late => 0.1,
+            Self::Late => 0.18,
         }
     }
 }

@@ -190,7 +190,7 @@ modes! {
     /// Middle 60°, 7 pulses: 18 carriers per turn with one notch each; 4 sin 70° + 2 of equation (17).
     Mid7: Row::middle60("mid7", 3, 5.758_77, [0.0, 0.079], Border::new((126.0, 121.0), (0.913, 0.885)));
     /// Middle 60°, 3 pulses: 6 carriers per turn with one notch each; 2 of equation (15).
-    Mid3: Row::middle60("mid3", 1, 2.0, [-0.043, 0.68], Border::new((297.0, 290.0), (0.990, 0.978)));
+    Mid3: Row::middle60("mid3", 1, 2.0, [0.01, 0.408], Border::new((297.0, 290.0), (0.990, 0.978)));
     /// Square wave: 6 carriers per turn without a notch, or with one where a link has jumped and less voltage is asked for.
     Square: Row {
         regulation: Regulation::Angle,

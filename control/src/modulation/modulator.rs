@@ -60,9 +60,9 @@ const LONGEST_WAIT: u32 = 100;
 const AHEAD: u32 = 2;
 
 /// Shortest and longest locked half, as shares of the nominal one, while it catches up with its angle. A triangular
-/// carrier's voltage has the right angle wherever its carrier stands, so it may take its time, and its ripple stays
+/// carrier's voltage has the right angle wherever its carrier stands, so it need not be longer, and its ripple stays
 /// small; a pattern's angle is that of its boundaries.
-const CARRIER_STRETCH: (f32, f32) = (0.95, 1.05);
+const CARRIER_STRETCH: (f32, f32) = (0.8, 1.05);
 const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
 
 impl Modulator {

@@ -328,16 +328,24 @@ pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
     (next_half / 2 * to.carriers()).is_multiple_of(from.carriers())
 }
 
-/// The number of the new mode's first half. Between locked modes it begins at the very angle; from a free carrier
-/// (or none) at the carrier start nearest to the pulse angle, of an optimised pattern at the nearest half, and its length makes up the difference.
+/// The number of the new mode's first half. Between locked modes it begins at the very angle; from a free carrier (or none) a pattern with the carrier
+/// start nearest to the pulse angle, an optimised one with the nearest half, whose length makes up the difference. A carrier begins with the
+/// start that has just passed and catches up: shorter halves have less ripple, longer ones had up to 5 % more of a small current.
 pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
     match (from.carriers(), to.carriers()) {
         (_, 0) => 0,
         #[cfg(feature = "optimal")]
         (0, new) if to.is_optimal() => nearest(2 * new, pulse),
+        (0, new) if to.is_carrier() => begun(new, pulse) * 2,
         (0, new) => nearest(new, pulse) * 2,
         (old, new) => next_half * new / old,
     }
+}
+
+/// The number of the part that a pulse angle lies in, of so many in a turn.
+#[inline(always)]
+fn begun(parts: u32, pulse: Angle) -> u32 {
+    ((u64::from(pulse.0) * u64::from(parts)) >> 32) as u32
 }
 
 /// The number of the part that begins nearest to a pulse angle, of so many in a turn.

@@ -176,6 +176,7 @@ impl<L: ControlLaw> Axis<L> {
             ripple_share: 1.0,
             ripple_s2: None,
             settled: true,
+            joins: false,
         };
         let law = Law { gains: &settings.gains, clock: &settings.clock, tables };
         let sample = RotorSample::new(input.measured.currents_a, input.measured.angle, tables);

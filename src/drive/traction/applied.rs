@@ -78,6 +78,7 @@ pub(super) const NO_LIMITS: ModeLimits = ModeLimits {
     ripple_share: 1.0,
     ripple_s2: None,
     settled: true,
+    joins: false,
 };
 
 /// The limits that a decided mode sets to control at a speed, for the last operating point's modulation index, so long after it, in s.
@@ -96,8 +97,8 @@ pub(super) fn limits(
     // Edges can move at an optimised pattern's largest index, too.
     let is_all = !matches!(follows, Regulated::Mean | Regulated::Fundamental);
     let largest = if is_all { largest } else { REGULATION_ROOM * largest };
-    // The last half before another pattern leads to the point that the torque's trim asks for there.
-    let trimmed = if mode.is_pattern() && decision.after.is_pattern() { decision.after } else { mode };
+    // The half that leads to another pattern does so to the point that the torque's trim asks for there.
+    let trimmed = if decision.leads() { decision.after } else { mode };
     let (index_limit, filled) =
         exit.fill(mode, [index_floor(rate, devices), largest], modulation_index, passed_s);
     ModeLimits {
@@ -113,6 +114,7 @@ pub(super) fn limits(
             clock.seconds(devices.shortest_half_ticks as i32),
         )),
         settled: exit.is_settled(decision),
+        joins: decision.joins(),
     }
 }
 

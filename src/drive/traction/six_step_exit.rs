@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn it_falls_once_the_pattern_has_grown() {
         let mut exit = exit(None);
-        let at = |boundary, mode| Decision { boundary: Instant(boundary), mode, after: mode };
+        let at = |boundary, mode| Decision { boundary: Instant(boundary), mode, before: mode, after: mode };
         assert!(exit.is_settled(&at(0, Mode::Square)), "out of none");
         let halves = TRANSITION_SECTORS * Mode::Mid3.sector_halves();
         assert!(halves > 1);

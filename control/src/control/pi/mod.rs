@@ -28,6 +28,7 @@
 //!     # ripple_share: 0.05,
 //!     # ripple_s2: None,
 //!     # settled: true,
+//!     # joins: false,
 //!     // …
 //! };
 //! let volt_seconds = Some(AlphaBeta::default());

@@ -194,24 +194,28 @@ fn a_free_carrier_gives_way_at_its_valley_and_gates_go_off_at_once() {
     }
 }
 
-/// Out of a free carrier or none a mode begins at its carrier, or at an optimised pattern's half, that is nearest: at every angle of 16 bits, and
-/// where the nearest one changes.
+/// Out of a free carrier or none a carrier begins with the start that has passed, a pattern with the carrier, or the optimised pattern's half, that is
+/// nearest: at every angle of 16 bits, and where the first half changes.
 #[test]
-fn the_first_half_is_the_nearest_one_of_the_turn() {
+fn the_first_half_is_the_last_or_the_nearest_one_of_the_turn() {
     for to in locked() {
         let turn = 2 * to.carriers();
         let step = if to.is_optimal() { 1 } else { 2 };
-        let middles = (0..turn)
-            .map(|half| boundary(half, to.carriers()).0.wrapping_add(boundary(1, to.carriers()).0 / 2));
-        let near =
-            middles.flat_map(|middle| (0..9).map(move |units| middle.wrapping_add(units).wrapping_sub(4)));
+        let half_angle = boundary(1, to.carriers()).0;
+        let changes =
+            (0..2 * turn).map(|k| boundary(k / 2, to.carriers()).0.wrapping_add(k % 2 * (half_angle / 2)));
+        let near = changes.flat_map(|at| (0..9).map(move |units| at.wrapping_add(units).wrapping_sub(4)));
         let angles = (0..1_u32 << 16).map(|upper| upper << 16);
         for pulse in angles.chain(near).map(Angle) {
             let half = first_half(Mode::Async, to, 0, pulse);
             assert!(half < turn && half.is_multiple_of(step), "{to:?} {pulse:?}: {half}");
-            let off = (boundary(half, to.carriers()) - pulse).signed().unsigned_abs();
-            let most = boundary(step, to.carriers()).0 / 2 + 2;
-            assert!(off <= most, "{to:?} {pulse:?}: {half}, {off} of {most}");
+            let passed = (pulse - boundary(half, to.carriers())).signed();
+            let whole = (step * half_angle) as i32;
+            let of = if to.is_carrier() { 0..=whole } else { -whole / 2..=whole / 2 };
+            assert!(
+                (of.start() - 2..=of.end() + 2).contains(&passed),
+                "{to:?} {pulse:?}: {half}, {passed} of {whole}"
+            );
         }
     }
 }

@@ -179,8 +179,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.diodes = DiodeWatch::new();
         self.watch.command(voltage.vector);
         self.reference = Reference {
-            // An optimised pattern is that of the operating point; the vector moves its edges.
-            voltage_v: if mode.is_optimal() { voltage.steady_v } else { voltage.voltage_v },
+            // An optimised pattern is that of the operating point; the vector moves its edges. So is the pattern that another one leads to: the half in between
+            // takes the flux linkage there, which regulation would do once more.
+            voltage_v: if mode.is_optimal() || slot.key.leads() {
+                voltage.steady_v
+            } else {
+                voltage.voltage_v
+            },
             vector: voltage.vector,
             carrier_angle: voltage.carrier.angle(),
             rate: clock.angle_rate(omega),
