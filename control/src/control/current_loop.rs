@@ -355,7 +355,7 @@ mod tests {
         }
     }
 
-    /// Where a pattern joins the path of another one its voltage is the operating point's.
+    /// The voltage of a pattern that joins the path of another one is the operating point's.
     #[test]
     fn a_pattern_regulates_nothing_where_it_joins() {
         let (flux, reference) = (Dq { d: 0.1, q: -0.4 }, Dq { d: 0.12, q: -0.39 });
