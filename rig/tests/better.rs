@@ -75,8 +75,8 @@ fn switches_of_mode_are_without_shock() {
     }
 }
 
-/// At every edge of the pulses, where the rows of a trace need not be: of sweeps with 10 to 100 % of torque, 1,000, 1,500 and 1,800 V these are the ones that
-/// change most, by 23 N·m and 1.2 %, and one that did by 56 N·m and 13 %.
+/// Torque at every edge of the pulses, where the rows of a trace need not be: of the sweeps with 10 to 100 % of torque on 1,000, 1,500 and 1,800 V those that changed
+/// modes with most, 58 N·m and 13.5 %, and one that changes with most now, 23 N·m.
 #[test]
 fn at_part_load_on_any_link_too() {
     for load in [

@@ -34,7 +34,7 @@ pub enum Zeros {
 }
 
 impl Zeros {
-    /// Share of the zero vectors at the start. The early one is a compromise: motoring wants more, braking less.
+    /// Share of the zero vectors at the start. The early one and the late one are compromises: motoring wants more, braking less.
     const fn at_start(self) -> f32 {
         match self {
             Self::Even => 0.5,

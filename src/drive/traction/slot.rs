@@ -18,7 +18,7 @@ pub(super) struct Decision {
     pub mode: Mode,
     /// The mode of the half before it.
     pub before: Mode,
-    /// The mode of the half after that, as far as it is decided.
+    /// The mode of the half behind it, as far as it is decided.
     pub after: Mode,
 }
 
@@ -131,7 +131,7 @@ mod tests {
 
     /// Patterns meet; a carrier is led to and left by other laws.
     #[test]
-    fn one_pattern_leads_to_the_one_of_fewer_pulses() {
+    fn one_pattern_leads_to_the_one_of_fewer_carriers() {
         use Mode::{Mid3, Mid7, Off, Square, Sync12};
         for (before, mode, after, joins, leads) in [
             (Mid7, Mid7, Mid7, false, false),
