@@ -25,7 +25,7 @@ pub struct CarrierHalf {
     /// The mode that made it.
     pub mode: Mode,
     /// Number of the half within the turn, for locked modes (in the mirrored turn when turning backward); otherwise
-    /// 0 for the rising and 1 for the falling carrier.
+    /// 0 for the rising and 1 for the falling carrier, and of the last two before an optimised pattern the number before that of the pattern's first.
     pub half: u8,
     /// Modes of the two halves that follow, as far as they are decided.
     pub ahead: [Mode; 2],

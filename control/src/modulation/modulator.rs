@@ -37,30 +37,28 @@ pub struct Modulator {
 /// Share of a half that is zero voltage, over half the zero voltage of a sector of 60° as an angle in rad.
 const ZERO_OF_HALF: f32 = 1.0 / core::f32::consts::FRAC_PI_6;
 
-/// A switch between locked modes that has been announced.
+/// A switch that has been announced: between locked modes, or from a free carrier to an optimised pattern.
 #[derive(Clone, Copy, Debug)]
 struct Plan {
     to: Mode,
     /// Number, in the present mode, of the half that is the new mode's first.
     at: u32,
+    /// Its number in the new mode.
+    first: u32,
 }
 
 /// The largest distance of a carrier from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
 const KEPT_ANGLE: Angle = Angle(71_582_788);
 
-/// The largest distance of a free carrier's boundary from the angle at which an optimised pattern takes over: 1.5°.
-#[cfg(feature = "optimal")]
-const CALM_ANGLE: Angle = Angle(17_895_697);
-
-/// Carriers for which it waits for such an angle.
+/// Carriers for which an optimised pattern waits for an angle at which it should take over from a free one.
 #[cfg(feature = "optimal")]
 const LONGEST_WAIT: u32 = 100;
 
 /// Halves by which a switch between locked modes is announced.
 const AHEAD: u32 = 2;
 
-/// Shortest and longest locked half, as shares of the nominal one, while it catches up with its angle. A triangular
-/// carrier's voltage has the right angle wherever its carrier stands, so it need not be longer, and its ripple stays
+/// Shortest and longest half, as shares of the nominal one, while it catches up with its angle; of a free carrier, where it ends at an optimised pattern's.
+/// A triangular carrier's voltage has the right angle wherever its carrier stands, so it need not be longer, and its ripple stays
 /// small; a pattern's angle is that of its boundaries.
 const CARRIER_STRETCH: (f32, f32) = (0.8, 1.05);
 const PATTERN_STRETCH: (f32, f32) = (0.5, 2.0);
@@ -104,13 +102,11 @@ impl Modulator {
         let flying = if flies { self.start_flying(start, pulse, &seen) } else { None };
         let mut half = match flying {
             Some(half) => half,
-            None if self.mode == Mode::Async => {
-                carrier::asynchronous(self.next_half, start, &seen, led, &self.devices)
-            }
+            None if self.mode == Mode::Async => self.free(start, pulse, &seen, led),
             None => self.locked(start, pulse, &seen, led),
         };
         half.mode = self.mode;
-        half.half = self.next_half as u8;
+        half.half = self.number() as u8;
         half.ahead = self.ahead(self.next_half);
         self.next_half = self.half_after(self.next_half, 1);
         self.left = None;
@@ -155,15 +151,15 @@ impl Modulator {
         }
     }
 
-    /// The mode of the half that begins at `start`. Between locked modes a switch is announced two halves ahead, so that
-    /// control can lead the flux to where the new pattern begins.
+    /// The mode of the half that begins at `start`. Between locked modes, and from a free carrier to an optimised pattern, a switch is announced two halves
+    /// ahead, so that control can lead the flux to where the new pattern begins.
     fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
         if let Some(plan) = self.plan {
             // A step of torque may have come since.
             if self.mode.is_carrier() && !self.may_begin(plan.to, pulse) {
                 self.plan = None;
             } else if plan.at == self.next_half {
-                self.switch_to(start, plan.to, pulse);
+                self.switch_to(start, plan.to, plan.first);
             }
             return;
         }
@@ -174,43 +170,49 @@ impl Modulator {
         if self.mode.carriers() > 0 && wanted.carriers() > 0 {
             let at = self.half_after(self.next_half, AHEAD);
             if self.may_begin(wanted, pulse) && schedule::may_switch(self.mode, wanted, at) {
-                self.plan = Some(Plan { to: wanted, at });
+                self.plan = Some(Plan { to: wanted, at, first: first_half(self.mode, wanted, at, pulse) });
             }
-        } else if schedule::may_switch(self.mode, wanted, self.next_half) && self.begins_calmly(wanted, pulse)
-        {
-            self.switch_to(start, wanted, pulse);
+        } else if schedule::may_switch(self.mode, wanted, self.next_half) {
+            if self.joins_free(wanted) {
+                self.plan = self.calm_plan(wanted, pulse, seen.rate);
+            } else {
+                self.switch_to(start, wanted, first_half(self.mode, wanted, self.next_half, pulse));
+            }
         }
     }
 
-    /// `true` unless an optimised pattern is to take over from a free carrier, which it does where its flux lies next to the fundamental.
-    /// It does not wait for ever: at some speeds no carrier of a hundred ends there.
+    /// The plan by which an optimised pattern takes over from a free carrier: where its flux lies next to the fundamental, and the next two halves can end.
+    /// It does not wait for ever: at some speeds none of a hundred carriers comes so near.
     #[cfg(feature = "optimal")]
-    fn begins_calmly(&mut self, wanted: Mode, pulse: Angle) -> bool {
-        let (Mode::Async, Some(branch)) = (self.mode, wanted.branch()) else { return true };
-        let first = first_half(self.mode, wanted, self.next_half, pulse);
-        let off = (boundary(first, wanted.carriers()) - pulse).signed().unsigned_abs();
-        let is_calm = branch.is_calm(first) && off < CALM_ANGLE.0;
+    fn calm_plan(&mut self, to: Mode, pulse: Angle, rate: f32) -> Option<Plan> {
+        let branch = to.branch()?;
+        let nominal = rate * (AHEAD * self.devices.shortest_half_ticks) as f32;
+        let (shortest, longest) = (CARRIER_STRETCH.0 * nominal, CARRIER_STRETCH.1 * nominal);
+        let middle = Angle((0.5 * (shortest + longest)) as u32);
+        let first = schedule::nearest(2 * to.carriers(), pulse + middle);
+        let turn = (boundary(first, to.carriers()) - pulse).0 as f32;
+        let is_calm = branch.is_calm(first) && turn > shortest && turn < longest;
         self.waited = if is_calm || self.waited >= LONGEST_WAIT { 0 } else { self.waited + 1 };
-        self.waited == 0
+        (self.waited == 0).then_some(Plan { to, at: self.next_half, first })
     }
 
     #[cfg(not(feature = "optimal"))]
     #[inline(always)]
-    fn begins_calmly(&self, _wanted: Mode, _pulse: Angle) -> bool {
-        true
+    fn calm_plan(&self, _to: Mode, _pulse: Angle, _rate: f32) -> Option<Plan> {
+        None
     }
 
     /// `true` if the locked half that begins at pulse angle `pulse` begins where it should, or a carrier is to follow. After a step of torque a
     /// carrier catches up with its angle over many halves; a pattern that began then would have its pulses in the wrong place.
     fn may_begin(&self, wanted: Mode, pulse: Angle) -> bool {
         let off = boundary(self.next_half, self.mode.carriers()) - pulse;
-        wanted.is_carrier() || off.signed().unsigned_abs() < KEPT_ANGLE.0
+        self.mode == Mode::Async || wanted.is_carrier() || off.signed().unsigned_abs() < KEPT_ANGLE.0
     }
 
-    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
+    fn switch_to(&mut self, start: Instant, mode: Mode, first: u32) {
         let from = self.mode;
         self.left = (from.has_path() && mode.is_carrier()).then_some((from, self.next_half as u8));
-        self.next_half = first_half(from, mode, self.next_half, pulse);
+        self.next_half = first;
         self.mode = mode;
         self.plan = None;
         self.schedule.switched(start);
@@ -224,6 +226,20 @@ impl Modulator {
         let next = plan.at == self.half_after(half, 1);
         let next_but_one = next || plan.at == self.half_after(half, AHEAD);
         [if next { plan.to } else { self.mode }, if next_but_one { plan.to } else { self.mode }]
+    }
+
+    /// `true` if this mode is to take over from a free carrier at an angle: an optimised pattern.
+    fn joins_free(&self, to: Mode) -> bool {
+        self.mode == Mode::Async && to.is_optimal()
+    }
+
+    /// The number of the next half by which control knows it: a free carrier's last ones count to the pattern's first.
+    fn number(&self) -> u32 {
+        match self.plan {
+            Some(Plan { first: 0, to, .. }) if self.joins_free(to) => 2 * to.carriers() - 1,
+            Some(Plan { first, to, .. }) if self.joins_free(to) => first - 1,
+            _ => self.next_half,
+        }
     }
 
     /// The number of the half that comes `later` halves (fewer than a turn) after number `half`.
@@ -265,6 +281,21 @@ impl Modulator {
         Some(carrier::synchronous(half, period_ticks, Zeros::Early, share, &self.devices))
     }
 
+    /// One half of the free carrier; the last ones before a pattern end together where it begins.
+    #[inline(always)]
+    fn free(&self, start: Instant, pulse: Angle, seen: &Reference, led: AlphaBeta) -> CarrierHalf {
+        let nominal = self.devices.shortest_half_ticks;
+        let period_ticks = self.plan.filter(|plan| self.joins_free(plan.to)).map_or(nominal, |plan| {
+            let halves = if plan.at == self.next_half { AHEAD } else { 1 };
+            let turn = (boundary(plan.first, plan.to.carriers()) - pulse).0 as f32;
+            let (shortest, longest) = CARRIER_STRETCH;
+            let nominal = nominal as f32;
+            self.whole_ticks(limit(turn / (halves as f32 * seen.rate), shortest * nominal, longest * nominal))
+        });
+        let share = seen.share_within(start, period_ticks) + led * (1.0 / period_ticks as f32);
+        carrier::synchronous(self.next_half, period_ticks, self.zeros(), share, &self.devices)
+    }
+
     /// One half of a carrier that is locked to the pulse angle.
     fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference, led: AlphaBeta) -> CarrierHalf {
         let carriers = self.mode.carriers();
@@ -291,7 +322,7 @@ impl Modulator {
         let mut notch = due * (own_rad * ZERO_OF_HALF);
         // Where hexagons meet an edge has the length that it should have, and whatever time is left is zero voltage.
         let beside_edge = |zero_rad: f32| due - nominal * (1.0 - zero_rad * ZERO_OF_HALF);
-        if let Some(next) = self.gives_way_to().filter(|next| next.is_pattern()) {
+        if let Some(next) = self.gives_way_to().map(|plan| plan.to).filter(|next| next.is_pattern()) {
             let old_rad = middle60::zero_rad(self.mode, self.voltage_v, seen.udc_v);
             let next_rad = middle60::least_zero_rad(next, seen, &self.devices);
             notch = beside_edge(old_rad);
@@ -316,16 +347,14 @@ impl Modulator {
         let per_tick = seen.rate * (1.0 / UNITS_PER_RADIAN);
         let at = |mode: Mode, half: u32| ripple_at(mode, half, seen.voltage_v, seen.udc_v, per_tick);
         let end = self.half_after(self.next_half, 1);
-        let begins = next.map_or(AlphaBeta::default(), |to| {
-            at(to, first_half(self.mode, to, self.next_half + 1, Angle::ZERO))
-        });
+        let begins = next.map_or(AlphaBeta::default(), |plan| at(plan.to, plan.first));
         let (mode, half) = self.left.unwrap_or((self.mode, end as u8));
         (begins - at(mode, half.into())) * (1.0 / seen.udc_v)
     }
 
     /// The mode that takes over after the next half, if one does.
-    fn gives_way_to(&self) -> Option<Mode> {
-        Some(self.plan.filter(|plan| plan.at == self.half_after(self.next_half, 1))?.to)
+    fn gives_way_to(&self) -> Option<Plan> {
+        self.plan.filter(|plan| plan.at == self.half_after(self.next_half, 1))
     }
 
     /// One half of an optimised pattern, its edges moved by what the wanted mean voltage differs from the pattern's fundamental.
@@ -345,7 +374,7 @@ impl Modulator {
         let own = AlphaBeta { alpha: round.cos, beta: round.sin } * (index * core::f32::consts::FRAC_2_PI);
         let more_ticks = (seen.share_within(start, period_ticks) - own) * period_ticks as f32 + led;
         let (half, wanted) = (self.next_half, (index, more_ticks));
-        match self.gives_way_to().and_then(|next| next.branch()) {
+        match self.gives_way_to().and_then(|plan| plan.to.branch()) {
             Some(next) => optimal::last_half((branch, next), half, period_ticks, wanted, &self.devices),
             None => optimal::half(branch, half, period_ticks, wanted, &self.devices),
         }
@@ -393,6 +422,53 @@ mod tests {
                 }
                 assert_eq!(modulator.mode, mode, "{hz} Hz, {index}");
             }
+        }
+    }
+
+    /// From whatever angle, the free carrier's last two halves end together where the pattern is calm, and announce it; a hundred carriers are enough at 40 Hz.
+    #[test]
+    fn a_free_carrier_ends_where_the_optimised_pattern_begins() {
+        let clock = Clock::new(25_000_000, 2_500);
+        let devices = SwitchLimits::new(250, 0, 900.0, &clock);
+        let rate = (40.0 * 4_294_967_296.0 / 25e6) as f32;
+        let reference = |start: u32, now: Instant| {
+            let angle = (f64::from(rate) * f64::from(now.0)) as u64 as u32;
+            let index = if now.0 < 60_000 { 0.0 } else { 0.3 };
+            Reference {
+                modulation_index: index,
+                ..Reference::turning(
+                    index * six_step_v(1_500.0),
+                    Angle(angle.wrapping_add(start)),
+                    rate,
+                    now,
+                    1_500.0,
+                )
+            }
+        };
+        for start in (0..64).map(|part| part << 26) {
+            let mut modulator = Modulator::new(devices, Schedule::on(Ladder::OPTIMAL, &clock));
+            let mut now = Instant(0);
+            let mut last: [CarrierHalf; 3] = Default::default();
+            while !last[2].mode.is_optimal() {
+                last.rotate_left(1);
+                last[2] = modulator.step(now, Some(&reference(start, now)));
+                now = now.after(last[2].period_ticks);
+                assert!(now.0 < 6_000_000, "{start:x}");
+            }
+            let [one, two, first] = last;
+            let nominal = devices.shortest_half_ticks as f32;
+            for half in [one, two] {
+                let stretch = half.period_ticks as f32 / nominal;
+                assert!(half.mode == Mode::Async && (0.8..1.05).contains(&stretch), "{start:x} {half:?}");
+            }
+            assert_eq!((one.ahead, two.ahead), ([Mode::Async, first.mode], [first.mode; 2]));
+            let turn = 2 * first.mode.carriers();
+            assert!(first.mode.branch().is_some_and(|branch| branch.is_calm(first.half.into())));
+            assert_eq!((u32::from(two.half) + 1) % turn, first.half.into());
+            let begins = now.0 - first.period_ticks;
+            let off = boundary(first.half.into(), turn / 2)
+                - reference(start, Instant(begins)).pulse_at(Instant(begins));
+            assert!(off.signed().unsigned_abs() < 2 * rate as u32, "{start:x} {off:?}");
         }
     }
 }

@@ -224,7 +224,11 @@ impl Half {
 
 /// The number of half `half` of a mode in the mode that follows.
 fn number(from: Mode, to: Mode, half: u32) -> u32 {
-    if from == to { half } else { first_half(from, to, half, Angle::ZERO) }
+    if from == to || from == Mode::Async && to.is_optimal() {
+        half
+    } else {
+        first_half(from, to, half, Angle::ZERO)
+    }
 }
 
 #[cfg(test)]
