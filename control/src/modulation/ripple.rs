@@ -118,9 +118,6 @@ pub fn ripple_share(mode: Mode, modulation_index: f32) -> f32 {
 
 /// Least stator frequency of a locked pattern, in rad/s: none is made so slowly but by a rotor that has just stopped.
 const SLOWEST: f32 = 1.0;
-/// The rms value of an optimised pattern's ripple along the flux linkage over that of all of it: 0.4 to 0.6 for 15 to 7 pulses, 0.8 for 5, by the flux linkage of the 180 kW
-/// machine's sweeps.
-const ALONG_OPTIMAL: f32 = 0.55;
 
 /// Mean squares of a mode's flux ripple along the flux linkage and across it, over the square of the link's voltage, in s², for a fundamental of
 /// `modulation_index` of six-step at a stator frequency of `omega` (rad/s; a free carrier's halves last `free_half_s` at any).
@@ -145,10 +142,20 @@ pub fn ripple_squares(mode: Mode, modulation_index: f32, omega: f32, free_half_s
     }
     let per_v = modulation_index * core::f32::consts::FRAC_2_PI / omega;
     let share = ripple_share(mode, modulation_index);
-    let along = if mode.is_pattern() { mode.row().ripple.least } else { ALONG_OPTIMAL * share };
+    let along = along_share(mode, modulation_index);
     let along = if along < share { along } else { share };
     let (along, share) = (along * along, share * share);
     [along, share - along].map(|square| square * (per_v * per_v))
+}
+
+/// The rms value of a pattern's ripple along the flux linkage as a share of the fundamental flux: a hexagon's own, or by the optimised pattern's angles.
+#[inline(always)]
+fn along_share(mode: Mode, _modulation_index: f32) -> f32 {
+    #[cfg(feature = "optimal")]
+    if let Some(branch) = mode.branch() {
+        return branch.along(_modulation_index);
+    }
+    mode.row().ripple.least
 }
 
 #[cfg(test)]

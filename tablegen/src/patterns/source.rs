@@ -15,6 +15,7 @@ pub fn angle_table(branches: &[Followed]) -> String {
         let first = followed.nodes.first().map_or(0.0, |(index, _)| *index);
         let last = followed.nodes.last().map_or(0.0, |(index, _)| *index);
         let [least, linear, square] = ripple_fit(followed);
+        let [along, along_linear] = along_fit(followed);
         let _ = write!(
             out,
             "
@@ -30,6 +31,7 @@ pub static {name}: Branch = Branch {{
     last: {last:?},
     inverse_step: {:?},
     ripple: [{least:.4}, {linear:.4}, {square:.4}],
+    along: [{along:.4}, {along_linear:.4}],
     nodes: &[
 ",
             branch.pulses,
@@ -64,6 +66,21 @@ fn ripple_fit(followed: &Followed) -> [f64; 3] {
         }
     }
     solved(matrix, right)
+}
+
+/// The rms value of the ripple flux along the fundamental's, as a share of that, as a linear function of the share of six-step that the fundamental lacks, by least
+/// squares.
+fn along_fit(followed: &Followed) -> [f64; 2] {
+    let mut sums = [0.0; 5];
+    for (index, angles) in &followed.nodes {
+        let (lacks, along) =
+            (1.0 - index, Waveform { first: followed.branch.first(), angles_rad: angles }.along());
+        let terms = [1.0, lacks, lacks * lacks, along, lacks * along];
+        sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+    }
+    let [count, lack, square, along, both] = sums;
+    let linear = (count * both - lack * along) / (count * square - lack * lack);
+    [(along - linear * lack) / count, linear]
 }
 
 /// Cramer's rule.

@@ -71,6 +71,14 @@ impl Waveform<'_> {
         (1..).map(move |k| (harmonic(6.0 * f64::from(k) - 1.0), harmonic(6.0 * f64::from(k) + 1.0)))
     }
 
+    /// The rms value of the ripple flux along the fundamental's, as a share of that. There harmonics of the orders 6k − 1 and 6k + 1 add.
+    pub(super) fn along(&self) -> f64 {
+        let orders = LAST_HARMONIC as usize / 6;
+        let squares =
+            self.flux_harmonics().take(orders).map(|(below, above)| (below + above) * (below + above));
+        (0.5 * squares.sum::<f64>()).sqrt() / self.fundamental()
+    }
+
     /// The shortest pulse or pause, as an angle in rad: between the edges at 0, at the angles, and mirrored at 90°.
     pub fn shortest_rad(&self) -> f64 {
         let last = self.angles_rad.last().copied().unwrap_or(0.0);

@@ -40,6 +40,8 @@ pub struct Branch {
     inverse_step: f32,
     /// Ripple as a share of the fundamental flux: at six-step, per missing share, and per missing share squared.
     pub ripple: [f32; 3],
+    /// The rms value of the ripple along the flux, likewise: at six-step, and per missing share.
+    along: [f32; 2],
     /// The angles in rad, node by node.
     nodes: &'static [f32],
 }
@@ -70,6 +72,12 @@ impl Branch {
         let above = row(node + 1);
         let above = if above.is_empty() { below } else { above };
         Pattern { branch: self, below, above, part: place - node as f32 }
+    }
+
+    /// The rms value of the ripple along the flux as a share of the fundamental flux, for a fundamental of so much of six-step.
+    pub fn along(&self, index: f32) -> f32 {
+        let [least, linear] = self.along;
+        least + linear * (1.0 - self.within(index))
     }
 
     /// `true` for a half at whose beginning the pattern may take over from a free carrier.
