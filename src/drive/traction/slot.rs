@@ -28,10 +28,13 @@ impl Decision {
         self.before.is_pattern() && self.mode.is_pattern() && self.before as u8 != self.mode as u8
     }
 
-    /// `true` of a pattern's last half before one of fewer carriers, which leads to that one's operating point. One of fewer that gives way to more leaves
-    /// the way there to them: its zero vector would last so much longer, and at a third to half of the torque and 1,800 V take 45 N·m beyond its ripple.
+    /// `true` of a pattern's last half before another, which leads to that one's operating point: an optimised pattern's always. One of whole edges that gives
+    /// way to more carriers leaves the way there to them: its zero vector would last so much longer, and at a third to half of the torque and 1,800 V take
+    /// 45 N·m beyond its ripple.
     pub const fn leads(&self) -> bool {
-        self.after.is_pattern() && self.mode.is_pattern() && self.after.carriers() < self.mode.carriers()
+        let Self { mode, after, .. } = self;
+        let of_edges = mode.is_pattern() && after.is_pattern() && after.carriers() < mode.carriers();
+        of_edges || mode.is_optimal() && after.is_optimal() && *after as u8 != *mode as u8
     }
 
     /// `true` if an operating point for one serves the other, too: that of the same boundary and mode, and that of one before which is less than
