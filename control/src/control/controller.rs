@@ -254,6 +254,8 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
             ripple_share: limits.ripple_share,
             largest_nm: ratings.max_torque_nm,
             period_s,
+            #[cfg(feature = "optimal")]
+            by_sixths: (limits.follows == Regulated::Path).then_some(omega),
         });
         let way = (can_step, limits.filled && !limits.settled);
         self.target = Target {

@@ -4,6 +4,9 @@
 //! to some percent, most in the patterns of few pulses: in proportion to the square of the ripple, as the curvature of torque over
 //! flux does it. What follows from the map is known beforehand ([`ripple_nm`]). Beyond that the torque of the measured currents tells: what is
 //! missing on average is slowly added to the demand, and what was learned under one pattern holds for the next one.
+//!
+//! Under optimised patterns the average is that of whole sixths of a turn, in which torque repeats. A trim that followed the ripple of torque would shake the
+//! reference in step with the pulses, whose edges reach the flux linkage in one direction at a time: half a percent too much of it was made.
 
 use crate::frames::{limit, limit_magnitude};
 use crate::machine::Tables;
@@ -48,6 +51,31 @@ pub struct TorqueTrim {
     curvature: f32,
     last_demand_nm: f32,
     hold_s: f32,
+    #[cfg(feature = "optimal")]
+    sixth: Sixth,
+}
+
+/// The part of a sixth of a turn that has passed.
+#[cfg(feature = "optimal")]
+#[derive(Clone, Copy, Debug)]
+struct Sixth {
+    passed_s: f32,
+    /// Torque that has been missing, summed up, in N·m·s.
+    missing_nms: f32,
+}
+
+#[cfg(feature = "optimal")]
+impl Sixth {
+    const NONE: Self = Self { passed_s: 0.0, missing_nms: 0.0 };
+
+    /// A period in which so much torque has been missing, in N·m; the mean and the time of the sixth that it ends.
+    fn step(&mut self, missing_nm: f32, period_s: f32, omega: f32) -> Option<(f32, f32)> {
+        let Self { passed_s, missing_nms } = *self;
+        let (passed_s, missing_nms) = (passed_s + period_s, missing_nms + missing_nm * period_s);
+        let ends = passed_s * omega.abs() >= core::f32::consts::FRAC_PI_3;
+        *self = if ends { Self::NONE } else { Self { passed_s, missing_nms } };
+        ends.then_some((missing_nms / passed_s, passed_s))
+    }
 }
 
 /// Everything that a step of the trim works on.
@@ -66,11 +94,20 @@ pub struct Input {
     pub ripple_share: f32,
     pub largest_nm: f32,
     pub period_s: f32,
+    /// Electrical angular speed, in rad/s, where whole sixths of a turn are averaged.
+    #[cfg(feature = "optimal")]
+    pub by_sixths: Option<f32>,
 }
 
 impl TorqueTrim {
     pub const fn new() -> Self {
-        Self { curvature: 0.0, last_demand_nm: 0.0, hold_s: HOLD_S }
+        Self {
+            curvature: 0.0,
+            last_demand_nm: 0.0,
+            hold_s: HOLD_S,
+            #[cfg(feature = "optimal")]
+            sixth: Sixth::NONE,
+        }
     }
 
     /// By how much the magnitude of the demand is to grow, in N·m, beyond the torque of the ripple that is foreseen.
@@ -84,6 +121,10 @@ impl TorqueTrim {
         self.last_demand_nm = input.demand_nm;
         if change > STEADY_RATE * input.largest_nm * input.period_s {
             self.hold_s = HOLD_S;
+            #[cfg(feature = "optimal")]
+            {
+                self.sixth = Sixth::NONE;
+            }
             return;
         }
         if self.hold_s > 0.0 {
@@ -100,11 +141,22 @@ impl TorqueTrim {
         if input.limited && (input.short || missing > 0.0) {
             return;
         }
+        let Some((missing, passed_s)) = self.averaged(missing, input) else { return };
         let scale = scale(input.demand_nm, input.largest_nm);
-        let step = BANDWIDTH_RAD_S * input.period_s * missing / scale;
+        let step = BANDWIDTH_RAD_S * passed_s * missing / scale;
         let square = input.ripple_share * input.ripple_share;
         let most = MOST + input.foreseen_nm.abs() / scale;
         self.curvature = limit_magnitude(self.curvature * square + step, most) / square;
+    }
+
+    /// The missing torque that is to be learnt from, in N·m, and its time, in s.
+    #[inline(always)]
+    fn averaged(&mut self, missing_nm: f32, input: &Input) -> Option<(f32, f32)> {
+        #[cfg(feature = "optimal")]
+        if let Some(omega) = input.by_sixths {
+            return self.sixth.step(missing_nm, input.period_s, omega);
+        }
+        Some((missing_nm, input.period_s))
     }
 }
 
@@ -138,6 +190,8 @@ mod tests {
                 ripple_share: RIPPLE_SHARE,
                 largest_nm: LARGEST_NM,
                 period_s: 1e-4,
+                #[cfg(feature = "optimal")]
+                by_sixths: None,
             });
         }
         trim.trim_nm(demand_nm, foreseen_nm, RIPPLE_SHARE, LARGEST_NM)
@@ -175,6 +229,8 @@ mod tests {
                     ripple_share,
                     largest_nm: LARGEST_NM,
                     period_s: 1e-4,
+                    #[cfg(feature = "optimal")]
+                    by_sixths: None,
                 });
             }
             [0.0, RIPPLE_SHARE].map(|share| trim.trim_nm(900.0, 0.0, share, LARGEST_NM))
@@ -204,6 +260,8 @@ mod tests {
                     ripple_share: RIPPLE_SHARE,
                     largest_nm,
                     period_s,
+                    #[cfg(feature = "optimal")]
+                    by_sixths: None,
                 });
             }
             assert_eq!(
@@ -229,8 +287,46 @@ mod tests {
                 ripple_share: RIPPLE_SHARE,
                 largest_nm: 1_024.0,
                 period_s: 1.0 / 1_024.0,
+                #[cfg(feature = "optimal")]
+                by_sixths: None,
             });
         }
         assert!(trim.curvature > 0.0);
+    }
+
+    /// A torque whose ripple repeats every sixth of a turn moves the trim by its mean alone, once a sixth.
+    #[cfg(feature = "optimal")]
+    #[test]
+    fn a_ripple_of_torque_does_not_shake_the_trim() {
+        const SAMPLES: u32 = 20;
+        let (mut trim, omega) = (TorqueTrim::new(), -800.0_f32);
+        let period_s = core::f32::consts::FRAC_PI_3 / omega.abs() / SAMPLES as f32 * 1.000_1;
+        let mut step = |sample: u32| {
+            let ripple_nm = if sample % SAMPLES < SAMPLES / 2 { 200.0 } else { -200.0 };
+            trim.step(&Input {
+                demand_nm: 900.0,
+                measured_nm: 899.0 + ripple_nm,
+                foreseen_nm: 0.0,
+                limited: false,
+                short: false,
+                ripple_share: RIPPLE_SHARE,
+                largest_nm: LARGEST_NM,
+                period_s,
+                by_sixths: Some(omega),
+            });
+            trim.trim_nm(900.0, 0.0, RIPPLE_SHARE, LARGEST_NM)
+        };
+        let held = (HOLD_S / period_s) as u32 + 2;
+        assert_eq!((0..held).map(|_| step(0)).fold(0.0, f32::max), 0.0);
+        let mut before = 0.0;
+        for sample in 1..=10 * SAMPLES {
+            let (now, ends) = (step(sample), sample % SAMPLES == 0);
+            let mean_nm = BANDWIDTH_RAD_S * SAMPLES as f32 * period_s;
+            assert!(
+                (now - before - if ends { mean_nm } else { 0.0 }).abs() < 1e-3,
+                "{sample}: {before} {now}"
+            );
+            before = now;
+        }
     }
 }
