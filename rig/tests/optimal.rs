@@ -39,11 +39,6 @@ fn drive(line: &str) -> Recording {
 
 /// No more turn-ons than 900 Hz allow, and no more than this excess of current and torque at any switch.
 fn check_switches(line: &str, most_percent: f64, most_nm: f64) {
-    check_switches_by(line, |_| (most_percent, most_nm));
-}
-
-/// The same, by the mode that is left.
-fn check_switches_by(line: &str, most: impl Fn(&str) -> (f64, f64)) {
     let recording = drive(line);
     let turn_ons = analysis::most_turn_ons(&recording, 0.1);
     assert!(turn_ons <= 91, "{line}: {turn_ons} turn-ons");
@@ -51,7 +46,6 @@ fn check_switches_by(line: &str, most: impl Fn(&str) -> (f64, f64)) {
     assert!(switches.len() >= 6, "{line}: {} switches", switches.len());
     for switch in switches {
         let told = format!("{line}: {switch:?}");
-        let (most_percent, most_nm) = most(switch.from);
         assert!(switch.excess_percent < most_percent, "{told}");
         assert!(switch.torque_excursion_nm < most_nm, "{told}");
     }
@@ -72,11 +66,27 @@ fn through_field_weakening_into_square_wave() {
 fn at_part_load_too() {
     check_switches("sweep --down --torque-scale 0.5 --patterns optimal", 1.5, 15.0);
     check_switches("sweep --down --torque-scale 0.2 --patterns optimal", 1.5, 15.0);
-    // Where the free carrier gives way to a pattern a zero vector may last half as long again, by the phase that the carrier happens to have: with every fourth load or so.
-    let most = |from: &str| if from == "async" { (2.5, 25.0) } else { (2.0, 15.0) };
     for scale in ["0.2", "0.25", "0.3", "0.35"] {
-        let line = format!("sweep --down --brake --torque-scale {scale} --udc 1000 --patterns optimal");
-        check_switches_by(&line, most);
+        check_switches(
+            &format!("sweep --down --brake --torque-scale {scale} --udc 1000 --patterns optimal"),
+            2.0,
+            15.0,
+        );
+    }
+}
+
+/// Whatever phase the free carrier happens to have: its last halves end where the pattern begins, and lead the flux linkage there. Of halves that ended by
+/// chance within 1.5° these four loads had 2.3 to 3.2 % of current, and up to 19 N·m.
+#[test]
+fn a_free_carrier_gives_way_without_a_shock() {
+    for load in ["0.15", "0.25", "0.4", "0.6"] {
+        let side = if load == "0.15" { "" } else { "--brake" };
+        let recording =
+            drive(&format!("sweep --to 700 --udc 1000 {side} --torque-scale {load} --patterns optimal"));
+        let switches = analysis::mode_switches(&recording);
+        let entry = switches.iter().find(|switch| switch.from == "async" && switch.to == "opp15").unwrap();
+        let exact = (entry.edge_excess_percent, entry.edge_torque_excursion_nm);
+        assert!(exact.0 < 0.8 && exact.1 < 4.0, "{load} {side}: {exact:?}");
     }
 }
 

@@ -7,15 +7,14 @@ use super::{CarrierHalf, Reference, SwitchLimits};
 use crate::frames::{Abc, AlphaBeta};
 use crate::time::Instant;
 
-/// A half of the asynchronous carrier, with volt-ticks over the link's voltage besides.
+/// A half of the asynchronous carrier, from an instant and so many ticks long, with volt-ticks over the link's voltage besides.
 pub fn asynchronous(
     half: u32,
-    start: Instant,
+    (start, period_ticks): (Instant, u32),
     seen: &Reference,
     led: AlphaBeta,
     devices: &SwitchLimits,
 ) -> CarrierHalf {
-    let period_ticks = devices.shortest_half_ticks;
     let share = seen.share_within(start, period_ticks) + led * (1.0 / period_ticks as f32);
     synchronous(half, period_ticks, Zeros::Even, share, devices)
 }

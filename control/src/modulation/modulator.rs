@@ -32,6 +32,9 @@ pub struct Modulator {
     /// Carriers for which an optimised pattern has waited to take over from a free one.
     #[cfg(feature = "optimal")]
     waited: u32,
+    /// Number of the half with which an optimised pattern takes over from a free carrier.
+    #[cfg(feature = "optimal")]
+    joined: u32,
 }
 
 /// Share of a half that is zero voltage, over half the zero voltage of a sector of 60° as an angle in rad.
@@ -43,8 +46,6 @@ struct Plan {
     to: Mode,
     /// Number, in the present mode, of the half that is the new mode's first.
     at: u32,
-    /// Its number in the new mode.
-    first: u32,
 }
 
 /// The largest distance of a carrier from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
@@ -78,6 +79,8 @@ impl Modulator {
             left: None,
             #[cfg(feature = "optimal")]
             waited: 0,
+            #[cfg(feature = "optimal")]
+            joined: 0,
         }
     }
 
@@ -120,8 +123,9 @@ impl Modulator {
     /// A free half ([`CarrierHalf::is_free`]) that begins at `start`, made anew from a newer reference.
     pub fn revised(&self, half: &CarrierHalf, start: Instant, reference: &Reference) -> CarrierHalf {
         let seen = if self.mirrored { reference.mirrored() } else { *reference };
+        let time = (start, self.devices.shortest_half_ticks);
         let mut revised =
-            carrier::asynchronous(half.half.into(), start, &seen, AlphaBeta::default(), &self.devices);
+            carrier::asynchronous(half.half.into(), time, &seen, AlphaBeta::default(), &self.devices);
         (revised.mode, revised.half, revised.ahead) = (half.mode, half.half, half.ahead);
         if self.mirrored {
             revised.compare_ticks.swap(1, 2);
@@ -159,7 +163,7 @@ impl Modulator {
             if self.mode.is_carrier() && !self.may_begin(plan.to, pulse) {
                 self.plan = None;
             } else if plan.at == self.next_half {
-                self.switch_to(start, plan.to, plan.first);
+                self.switch_to(start, plan.to, pulse);
             }
             return;
         }
@@ -170,13 +174,13 @@ impl Modulator {
         if self.mode.carriers() > 0 && wanted.carriers() > 0 {
             let at = self.half_after(self.next_half, AHEAD);
             if self.may_begin(wanted, pulse) && schedule::may_switch(self.mode, wanted, at) {
-                self.plan = Some(Plan { to: wanted, at, first: first_half(self.mode, wanted, at, pulse) });
+                self.plan = Some(Plan { to: wanted, at });
             }
         } else if schedule::may_switch(self.mode, wanted, self.next_half) {
             if self.joins_free(wanted) {
                 self.plan = self.calm_plan(wanted, pulse, seen.rate);
             } else {
-                self.switch_to(start, wanted, first_half(self.mode, wanted, self.next_half, pulse));
+                self.switch_to(start, wanted, pulse);
             }
         }
     }
@@ -193,7 +197,8 @@ impl Modulator {
         let turn = (boundary(first, to.carriers()) - pulse).0 as f32;
         let is_calm = branch.is_calm(first) && turn > shortest && turn < longest;
         self.waited = if is_calm || self.waited >= LONGEST_WAIT { 0 } else { self.waited + 1 };
-        (self.waited == 0).then_some(Plan { to, at: self.next_half, first })
+        self.joined = first;
+        (self.waited == 0).then_some(Plan { to, at: self.next_half })
     }
 
     #[cfg(not(feature = "optimal"))]
@@ -209,10 +214,10 @@ impl Modulator {
         self.mode == Mode::Async || wanted.is_carrier() || off.signed().unsigned_abs() < KEPT_ANGLE.0
     }
 
-    fn switch_to(&mut self, start: Instant, mode: Mode, first: u32) {
+    fn switch_to(&mut self, start: Instant, mode: Mode, pulse: Angle) {
         let from = self.mode;
         self.left = (from.has_path() && mode.is_carrier()).then_some((from, self.next_half as u8));
-        self.next_half = first;
+        self.next_half = self.first(mode, self.next_half, pulse);
         self.mode = mode;
         self.plan = None;
         self.schedule.switched(start);
@@ -233,13 +238,22 @@ impl Modulator {
         self.mode == Mode::Async && to.is_optimal()
     }
 
+    /// The number, in the mode `to`, of the half with which it takes over where this one's half `next_half` would begin.
+    fn first(&self, to: Mode, next_half: u32, pulse: Angle) -> u32 {
+        #[cfg(feature = "optimal")]
+        if self.joins_free(to) {
+            return self.joined;
+        }
+        first_half(self.mode, to, next_half, pulse)
+    }
+
     /// The number of the next half by which control knows it: a free carrier's last ones count to the pattern's first.
     fn number(&self) -> u32 {
-        match self.plan {
-            Some(Plan { first: 0, to, .. }) if self.joins_free(to) => 2 * to.carriers() - 1,
-            Some(Plan { first, to, .. }) if self.joins_free(to) => first - 1,
-            _ => self.next_half,
+        #[cfg(feature = "optimal")]
+        if let Some(plan) = self.plan.filter(|plan| self.joins_free(plan.to)) {
+            return if self.joined == 0 { 2 * plan.to.carriers() - 1 } else { self.joined - 1 };
         }
+        self.next_half
     }
 
     /// The number of the half that comes `later` halves (fewer than a turn) after number `half`.
@@ -281,19 +295,18 @@ impl Modulator {
         Some(carrier::synchronous(half, period_ticks, Zeros::Early, share, &self.devices))
     }
 
-    /// One half of the free carrier; the last ones before a pattern end together where it begins.
+    /// One half of the free carrier; the last ones before an optimised pattern end together where it begins.
     #[inline(always)]
-    fn free(&self, start: Instant, pulse: Angle, seen: &Reference, led: AlphaBeta) -> CarrierHalf {
-        let nominal = self.devices.shortest_half_ticks;
-        let period_ticks = self.plan.filter(|plan| self.joins_free(plan.to)).map_or(nominal, |plan| {
+    fn free(&self, start: Instant, _pulse: Angle, seen: &Reference, led: AlphaBeta) -> CarrierHalf {
+        let period_ticks = self.devices.shortest_half_ticks;
+        #[cfg(feature = "optimal")]
+        let period_ticks = self.plan.map_or(period_ticks, |plan| {
             let halves = if plan.at == self.next_half { AHEAD } else { 1 };
-            let turn = (boundary(plan.first, plan.to.carriers()) - pulse).0 as f32;
-            let (shortest, longest) = CARRIER_STRETCH;
-            let nominal = nominal as f32;
+            let turn = (boundary(self.joined, plan.to.carriers()) - _pulse).0 as f32;
+            let (nominal, (shortest, longest)) = (period_ticks as f32, CARRIER_STRETCH);
             self.whole_ticks(limit(turn / (halves as f32 * seen.rate), shortest * nominal, longest * nominal))
         });
-        let share = seen.share_within(start, period_ticks) + led * (1.0 / period_ticks as f32);
-        carrier::synchronous(self.next_half, period_ticks, self.zeros(), share, &self.devices)
+        carrier::asynchronous(self.next_half, (start, period_ticks), seen, led, &self.devices)
     }
 
     /// One half of a carrier that is locked to the pulse angle.
@@ -347,7 +360,9 @@ impl Modulator {
         let per_tick = seen.rate * (1.0 / UNITS_PER_RADIAN);
         let at = |mode: Mode, half: u32| ripple_at(mode, half, seen.voltage_v, seen.udc_v, per_tick);
         let end = self.half_after(self.next_half, 1);
-        let begins = next.map_or(AlphaBeta::default(), |plan| at(plan.to, plan.first));
+        let begins = next.map_or(AlphaBeta::default(), |plan| {
+            at(plan.to, self.first(plan.to, self.next_half + 1, Angle::ZERO))
+        });
         let (mode, half) = self.left.unwrap_or((self.mode, end as u8));
         (begins - at(mode, half.into())) * (1.0 / seen.udc_v)
     }

@@ -183,7 +183,7 @@ fn a_free_carrier_gives_way_at_its_valley_and_gates_go_off_at_once() {
     for (from, to) in Mode::ALL.into_iter().flat_map(|from| Mode::ALL.map(|to| (from, to))) {
         for half in 0..2 * from.carriers().max(1) {
             let mut modulator = in_mode(from, half, to, false);
-            modulator.plan = Some(Plan { to, at: half, first: first_half(from, to, half, Angle::ZERO) });
+            modulator.plan = Some(Plan { to, at: half });
             let off = modulator.step(START, None);
             assert_eq!((off.mode, off.ahead, modulator.mode), (Mode::Off, [Mode::Off; 2], Mode::Off));
             assert!(modulator.plan.is_none() && off.compare_ticks == [u32::MAX; 3]);
