@@ -153,8 +153,9 @@ impl TorqueTrim {
     #[inline(always)]
     fn averaged(&mut self, missing_nm: f32, input: &Input) -> Option<(f32, f32)> {
         #[cfg(feature = "optimal")]
-        if let Some(omega) = input.by_sixths {
-            return self.sixth.step(missing_nm, input.period_s, omega);
+        match input.by_sixths {
+            Some(omega) => return self.sixth.step(missing_nm, input.period_s, omega),
+            None => self.sixth = Sixth::NONE,
         }
         Some((missing_nm, input.period_s))
     }

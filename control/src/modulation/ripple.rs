@@ -105,7 +105,7 @@ pub fn ripple_at(mode: Mode, half: u32, voltage_v: f32, udc_v: f32, omega: f32) 
 }
 
 /// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `modulation_index` of
-/// six-step: within 6 % of what a pattern's pulses have. The carriers count as one, that of 12
+/// six-step: within 6 % of what a pattern's pulses have, 12 % of an optimised one's. The carriers count as one, that of 12
 /// carriers a turn.
 #[inline(always)]
 pub fn ripple_share(mode: Mode, modulation_index: f32) -> f32 {

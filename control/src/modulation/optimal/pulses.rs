@@ -260,6 +260,42 @@ mod tests {
         }
     }
 
+    /// By the flux of the pulses themselves over a turn, in steps of a fortieth of a half: the share of all of it within 12 %, that along the flux within 0.012 of
+    /// the fundamental, which 0.55 of all of it for every branch misses by up to 0.11.
+    #[test]
+    fn the_ripples_shares_are_those_of_the_pulses() {
+        const STEPS: u32 = 40;
+        for (mode, branch, index) in everywhere() {
+            let step_rad = f64::from(branch.half_rad()) / f64::from(STEPS);
+            let mut flux = (0.0, 0.0);
+            let mut path = Vec::new();
+            for half in turn(branch, index) {
+                for step in 0..STEPS {
+                    let [from, to] = [step, step + 1].map(|step| half.on_ticks(PERIOD / STEPS * step));
+                    let share = |phase: usize| f64::from(from[phase] - to[phase]) / f64::from(PERIOD / STEPS);
+                    let [a, b, c] = [0, 1, 2].map(share);
+                    flux.0 += (2.0 * a - b - c) / 3.0 * step_rad;
+                    flux.1 += (b - c) / f64::from(crate::frames::SQRT_3) * step_rad;
+                    path.push(flux);
+                }
+            }
+            let samples = path.len() as f64;
+            let mean = path.iter().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x / samples, sum.1 + y / samples));
+            let fundamental = f64::from(index) * core::f64::consts::FRAC_2_PI;
+            let (mut along, mut across) = (0.0, 0.0);
+            for (place, (x, y)) in path.iter().enumerate() {
+                let (sin, cos) = ((place as f64 + 1.0) * step_rad).sin_cos();
+                let (x, y) = (mean.0 - x, mean.1 - y);
+                along += (x * cos + y * sin - fundamental).powi(2) / samples;
+                across += (y * cos - x * sin).powi(2) / samples;
+            }
+            let [along, all] = [along, along + across].map(|square| square.sqrt() / fundamental);
+            let told = [branch.along(index), crate::modulation::ripple_share(mode, index)].map(f64::from);
+            assert!((told[0] - along).abs() < 0.012, "{} {index}: {} for {along}", mode.name(), told[0]);
+            assert!((told[1] / all - 1.0).abs() < 0.12, "{} {index}: {} for {all}", mode.name(), told[1]);
+        }
+    }
+
     #[test]
     fn edges_move_by_the_volt_seconds_that_are_asked_for() {
         let branch = Mode::named("opp11").and_then(Mode::branch).unwrap();
