@@ -76,7 +76,7 @@ fn at_part_load_too() {
 }
 
 /// Whatever phase the free carrier happens to have: its last halves end where the pattern begins, and lead the flux linkage there. Of halves that ended by
-/// chance within 1.5° these four loads had 2.3 to 3.2 % of current, and up to 19 N·m.
+/// chance within 1.5° these four loads had 2.3 to 3.5 % of current, and up to 19 N·m.
 #[test]
 fn a_free_carrier_gives_way_without_a_shock() {
     for load in ["0.15", "0.25", "0.4", "0.6"] {
