@@ -29,7 +29,7 @@ impl Leg {
 
 /// The diodes of an open leg: current out of the leg (positive) flows through the lower one, current into it through
 /// the upper one. In between, for currents below half a percent of the machine's largest, the leg's voltage follows the current
-/// linearly, as with a small snubber; so a machine whose EMF stays below the link carries no more than that.
+/// linearly, which takes such a current away within microseconds.
 #[derive(Clone, Copy, Debug)]
 pub struct Clamp {
     small_current_a: f64,
@@ -40,6 +40,8 @@ pub struct Clamp {
 const SMALL_SHARE: f64 = 0.005;
 /// Step near the linear zone, as a share of its time constant; Runge–Kutta is stable up to 2.7.
 const STIFF_SHARE: f64 = 0.8;
+/// Time constants after which a current in the linear zone is gone.
+const SETTLED: f64 = 5.0;
 
 impl Clamp {
     /// For a machine.
@@ -86,6 +88,16 @@ impl Clamp {
         self.small_current_a
     }
 
+    /// `true` if nothing is left of such a current once all legs have been open for so long on a link of this voltage.
+    pub fn takes_away(&self, udc_v: f64, time_s: f64) -> bool {
+        time_s * self.slope_ohm(udc_v) >= SETTLED * self.least_inductance_h
+    }
+
+    /// Resistance of an open leg in the linear zone, on a link of this voltage, in ohm.
+    fn slope_ohm(&self, udc_v: f64) -> f64 {
+        0.5 * udc_v / self.small_current_a
+    }
+
     /// Longest step while legs are open, in s: short near the linear zone.
     pub fn step_s(&self, udc_v: f64, currents_a: [f64; 3], legs: &[Leg; 3]) -> f64 {
         let open = currents_a.iter().zip(legs).filter(|(_, leg)| **leg == Leg::Open);
@@ -94,8 +106,7 @@ impl Clamp {
 
     /// Longest step while the current that is nearest to zero is `nearest_a`, in s.
     pub fn step_near_s(&self, udc_v: f64, nearest_a: f64) -> f64 {
-        let slope_ohm = 0.5 * udc_v / self.small_current_a;
-        let stiff = STIFF_SHARE * self.least_inductance_h / slope_ohm;
+        let stiff = STIFF_SHARE * self.least_inductance_h / self.slope_ohm(udc_v);
         // No current moves faster than the whole link across the least inductance.
         let away = (nearest_a - self.small_current_a) * self.least_inductance_h / (1.5 * udc_v);
         away.clamp(stiff, LONGEST_STEP_S.max(stiff))

@@ -218,6 +218,13 @@ impl Stator {
         }
     }
 
+    /// The voltage of the machine without current, in V, rotor frame, at an electrical speed in rad/s, with the rotor at an angle of this sine and cosine.
+    pub fn emf_v(&self, omega: f64, rotor: (f64, f64)) -> (f64, f64) {
+        let flux = self.flux(0.0, 0.0);
+        let (slot_d, slot_q) = if self.slots_wb == 0.0 { (0.0, 0.0) } else { self.slots(rotor) };
+        (omega * (slot_d - flux.psi_q_wb), omega * (slot_q + flux.psi_d_wb))
+    }
+
     /// The change of a current in A over `dt_s`, in A, by one implicit step, with a resistance in ohm between each phase and a common point, where it changes at these
     /// rates in A/s now: `(L/dt + R + jωL) Δi = L di/dt`.
     pub fn settles(
