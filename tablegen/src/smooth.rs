@@ -21,7 +21,9 @@ pub struct FluxPoint {
     pub lqq_h: f64,
 }
 
-/// A bicubic spline (not-a-knot) through the nodes of a flux map; beyond the grid it goes on along its tangent.
+/// A bicubic spline (not-a-knot) through the nodes of a flux map. Beyond the grid it goes on along its tangent, which turns as the edge does, until a slope along the edge
+/// has lost half of itself; then it turns to the mean slope of that edge. Were it to go on, flux linkage would fall somewhere, and no current would have that which a
+/// short circuit asks for.
 #[derive(Clone, Debug)]
 pub struct SmoothMap {
     first_d: f64,
@@ -31,7 +33,14 @@ pub struct SmoothMap {
     cells_d: usize,
     cells_q: usize,
     cells: Vec<[Both; 16]>,
+    /// Below and above the grid, along each axis.
+    edges_d: [Edge; 2],
+    edges_q: [Edge; 2],
 }
+
+/// Share of itself that a slope along an edge loses on the way for which the tangent stands; and the way of its turn then, over that one.
+const LOSS: f64 = 0.5;
+const TURN: f64 = 0.3;
 
 impl SmoothMap {
     /// The spline of a map, mirrored to both signs of iq.
@@ -48,7 +57,15 @@ impl SmoothMap {
                 cells.push(core::array::from_fn(|k| Both([d[k], q[k]])));
             }
         }
+        let row = |r: usize| (0..columns).map(move |c| r * columns + c);
+        let column = |c: usize| (0..rows).map(move |r| r * columns + c);
+        let [psi_d, psi_q] = &surfaces;
+        let edge_d = |r: usize, out| Edge::new(row(r), out, (&psi_d.by_row, &psi_q.by_column, &psi_q.mixed));
+        let edge_q =
+            |c: usize, out| Edge::new(column(c), out, (&psi_q.by_column, &psi_d.by_row, &psi_d.mixed));
         Self {
+            edges_d: [edge_d(0, -1.0), edge_d(rows - 1, 1.0)],
+            edges_q: [edge_q(0, -1.0), edge_q(columns - 1, 1.0)],
             first_d: map.id_a[0],
             first_q: map.iq_a[0],
             step_d,
@@ -68,7 +85,9 @@ impl SmoothMap {
         let at = if beyond_d == 0.0 && beyond_q == 0.0 {
             inside
         } else {
-            inside.beyond(k, (x, y), (beyond_d, beyond_q))
+            let side = |edges: &[Edge; 2], way: f64| edges[usize::from(way > 0.0)].along(way);
+            let (along_d, along_q) = (side(&self.edges_d, beyond_d), side(&self.edges_q, beyond_q));
+            inside.beyond(k, (x, y), along_d, along_q)
         };
         let ([psi_d_wb, psi_q_wb], [by_d_d, by_d_q], [by_q_d, by_q_q]) = (at.value.0, at.by_x.0, at.by_y.0);
         FluxPoint {
@@ -154,16 +173,69 @@ impl Value {
         }
     }
 
-    /// Outside the grid: the edge's tangent, which turns as the edge does; so the slopes are those of the value there too.
-    fn beyond(self, k: &[Both; 16], (x, y): (f64, f64), (beyond_x, beyond_y): (f64, f64)) -> Self {
+    /// Outside the grid, so far along both axes, of which one may be 0; the slopes are those of the value there, too.
+    fn beyond(self, k: &[Both; 16], (x, y): (f64, f64), along_x: Beyond, along_y: Beyond) -> Self {
         let row = |i: usize| k[4 * i + 1] + y * (2.0 * k[4 * i + 2] + 3.0 * y * k[4 * i + 3]);
         let mixed = row(1) + x * (2.0 * row(2) + 3.0 * x * row(3));
+        let far_x = Both([along_x.slope, 0.0]);
+        let far_y = Both([0.0, along_y.slope]);
+        let near = self.value + along_x.near * self.by_x + along_y.near * self.by_y;
         Self {
-            value: self.value + beyond_x * self.by_x + beyond_y * self.by_y + beyond_y * (beyond_x * mixed),
-            by_x: self.by_x + beyond_y * mixed,
-            by_y: self.by_y + beyond_x * mixed,
+            value: near + along_y.near * (along_x.near * mixed) + along_x.far * far_x + along_y.far * far_y,
+            by_x: along_x.share * (self.by_x + along_y.near * mixed) + (1.0 - along_x.share) * far_x,
+            by_y: along_y.share * (self.by_y + along_x.near * mixed) + (1.0 - along_y.share) * far_y,
         }
     }
+}
+
+/// An edge of the grid.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    /// Mean slope of the flux linkage along the axis that leaves the grid here, per cell.
+    slope: f64,
+    /// The way for which the tangent stands, in cells.
+    straight: f64,
+}
+
+impl Edge {
+    /// Of some nodes, outwards in this direction of their axis; with each node's slope of the axis' own flux linkage along it, that of the other one along the edge, and how
+    /// that changes along the axis, per cell.
+    fn new(
+        nodes: impl Iterator<Item = usize>,
+        out: f64,
+        (own, other, mixed): (&[f64], &[f64], &[f64]),
+    ) -> Self {
+        let (mut sum, mut count, mut straight) = (0.0, 0.0, f64::INFINITY);
+        for node in nodes {
+            (sum, count) = (sum + own[node], count + 1.0);
+            let falls = -out * mixed[node];
+            if falls > 0.0 {
+                straight = f64::min(straight, LOSS * other[node] / falls);
+            }
+        }
+        Self { slope: sum / count, straight: straight.max(f64::MIN_POSITIVE) }
+    }
+
+    /// So many cells beyond it.
+    fn along(&self, way: f64) -> Beyond {
+        let &Self { slope, straight } = self;
+        if way.abs() <= straight {
+            return Beyond { near: way, far: 0.0, share: 1.0, slope };
+        }
+        let after = way.abs() - straight;
+        let share = 1.0 / (1.0 + after / (TURN * straight));
+        let far = (after * (1.0 - share)).copysign(way);
+        Beyond { near: way - far, far, share: share * share, slope }
+    }
+}
+
+/// A way beyond an edge, in cells: the part of it that goes along the tangent, the rest, the share of the tangent's slope where it ends, and the slope beside it.
+#[derive(Clone, Copy)]
+struct Beyond {
+    near: f64,
+    far: f64,
+    share: f64,
+    slope: f64,
 }
 
 /// Node values and derivatives, per cell, of one surface.

@@ -60,12 +60,44 @@ fn a_bicubic_surface_is_kept() {
             assert!((found + 2.0 * other).abs() < 1e-12, "{found}, not {other}");
         }
     }
-    for (id, iq) in [(-26.0, 2.0), (9.0, -11.0), (0.5, 12.0), (12.0, 13.0)] {
-        let (edge_d, edge_q) = (f64::clamp(id, -20.0, 5.0), f64::clamp(iq, -8.0, 8.0));
-        let ((d, by_d), (q, by_q)) = (along_d(edge_d), along_q(edge_q));
-        let (own_d, own_q) = (d + (id - edge_d) * by_d, q + (iq - edge_q) * by_q);
-        assert!((map.at(id, iq).psi_d_wb - own_d * own_q).abs() < 1e-12);
+}
+
+/// Beyond the grid the slopes are those of the flux linkage, go on as they are at the edge, and are far away its mean: no saturation, however deep, is turned over.
+#[test]
+fn a_map_that_saturates_goes_on_rising_beyond_its_grid() {
+    // Of the co-energy 0.3 id + 2 √(1 + (id² + iq²)/100), whose flux linkage stops rising.
+    let axis = |count: i32| (0..count).map(|k| -20.0 + 2.0 * f64::from(k)).collect::<Vec<_>>();
+    let (id_a, iq_a) = (axis(14), axis(21));
+    let nodes = |of: &dyn Fn(f64, f64) -> f64| {
+        id_a.iter().flat_map(|d| iq_a.iter().map(move |q| of(*d, *q))).collect::<Vec<_>>()
+    };
+    let root = |d: f64, q: f64| 50.0 * (1.0 + (d * d + q * q) / 100.0).sqrt();
+    let (psi_d_wb, psi_q_wb) = (nodes(&|d, q| 0.3 + d / root(d, q)), nodes(&|d, q| q / root(d, q)));
+    let map = SmoothMap::new(&FluxMap { id_a: id_a.clone(), iq_a: iq_a.clone(), psi_d_wb, psi_q_wb });
+    let near = |found: f64, expected: f64, within: f64| {
+        assert!((found - expected).abs() <= within, "{found}, not {expected}");
+    };
+    const H: f64 = 1e-5;
+    for step in 0..4_000 {
+        let (id, iq) = (f64::from(step % 67) * 9.1 - 300.0, f64::from(step / 67) * 10.3 - 300.0);
+        let at = map.at(id, iq);
+        let [right, left] = [H, -H].map(|h| map.at(id + h, iq));
+        let [above, below] = [H, -H].map(|h| map.at(id, iq + h));
+        near(at.ldd_h, (right.psi_d_wb - left.psi_d_wb) / (2.0 * H), 1e-8);
+        near(at.lqd_h, (right.psi_q_wb - left.psi_q_wb) / (2.0 * H), 1e-8);
+        near(at.ldq_h, (above.psi_d_wb - below.psi_d_wb) / (2.0 * H), 1e-8);
+        near(at.lqq_h, (above.psi_q_wb - below.psi_q_wb) / (2.0 * H), 1e-8);
+        let det = at.ldd_h * at.lqq_h - at.ldq_h * at.lqd_h;
+        assert!(at.ldd_h > 0.0 && at.lqq_h > 0.0 && det > 0.0, "({id}, {iq}): {at:?}");
     }
+    for edge in [map.edges_d[0], map.edges_d[1], map.edges_q[0]] {
+        let [before, after] = [1.0 - 1e-9, 1.0 + 1e-9].map(|by| edge.along(by * edge.straight));
+        near(before.near, after.near, 1e-7);
+        near(before.share, after.share, 1e-7);
+    }
+    let [inside, outside] = [-1e-9, 1e-9].map(|by| map.at(6.0 + by, 20.0 + by));
+    near(inside.ldd_h, outside.ldd_h, 1e-9);
+    near(inside.lqq_h, outside.lqq_h, 1e-9);
 }
 
 /// The one current for a flux linkage is found from anywhere, but for starts that are too far.
