@@ -8,12 +8,13 @@ use tractive::protection::Fault;
 use tractive_rig::ablation::Ablation;
 use tractive_rig::bench::Flaws;
 use tractive_rig::campaign::judge::Verdict;
-use tractive_rig::campaign::{Campaign, Case, Outcome, cases, dual, healthy, report, traction};
+use tractive_rig::campaign::{Campaign, Case, Outcome, dual, healthy, report, traction};
+use tractive_rig::machine::Machine;
 use tractive_rig::scenario::traction::PatternsName;
 
 /// The cases whose names have all these words.
 fn named(words: &str) -> Vec<Case> {
-    let mut list = cases(false);
+    let mut list = Campaign::new(None).unwrap().cases(false);
     list.retain(|case| words.split(' ').all(|word| case.name().split(' ').any(|part| part.contains(word))));
     assert!(!list.is_empty(), "{words}");
     list
@@ -25,7 +26,8 @@ fn is_lost(outcome: &Outcome) -> bool {
 
 #[test]
 fn nothing_escapes_the_fast_campaign() {
-    let outcomes = Campaign::new(None).unwrap().run_all(&cases(true), || ()).unwrap();
+    let campaign = Campaign::new(None).unwrap();
+    let outcomes = campaign.run_all(&campaign.cases(true), || ()).unwrap();
     let lost: Vec<_> = outcomes.iter().filter(|outcome| is_lost(outcome)).collect();
     assert!(lost.is_empty(), "{lost:#?}");
     assert!(outcomes.len() >= 500, "{}", outcomes.len());
@@ -46,6 +48,34 @@ fn nothing_escapes_the_fast_campaign() {
     }
 }
 
+/// A machine of another size has the same faults at its own speeds, currents and voltages, and its own rate of control.
+#[test]
+fn a_machine_of_48_v_has_a_campaign_of_its_own() {
+    const FAULTS: [&str; 9] = [
+        "none",
+        "uh-stuck-on",
+        "uh-stuck-off",
+        "uh-shorted",
+        "current-u-open",
+        "current-v-offset-0.64A",
+        "link-over",
+        "angle-jump",
+        "winding-sensor-unplugged",
+    ];
+    let machine = Machine::load("pmsm-48v-1kw").unwrap();
+    let campaign = Campaign::of(machine, None).unwrap();
+    let mut cases = campaign.cases(true);
+    cases.retain(|case| FAULTS.iter().any(|fault| case.name().split(' ').nth(1) == Some(fault)));
+    let outcomes = campaign.run_all(&cases, || ()).unwrap();
+    let names: BTreeSet<_> = outcomes.iter().map(|outcome| outcome.fault.as_str()).collect();
+    assert_eq!(names.len(), FAULTS.len(), "{names:?}");
+    for outcome in &outcomes {
+        assert!(!is_lost(outcome), "{outcome:?}");
+        // Above it the diodes alone carry more than the trip level.
+        assert!(outcome.speed_rpm < campaign.most_rpm().unwrap());
+    }
+}
+
 /// Every so many cases, and all of those with a wrong map or a link that moves where a pattern has hardly more voltage, or less voltage no more.
 #[test]
 fn nothing_escapes_the_optimised_patterns() {
@@ -54,7 +84,7 @@ fn nothing_escapes_the_optimised_patterns() {
         ["flux-20%", "link-"].iter().any(|fault| name.contains(fault))
             && [" 2000 ", " 2800 ", " 3000 "].iter().any(|speed| name.contains(speed))
     };
-    let traction = traction::cases(false).into_iter().enumerate();
+    let traction = traction::Drive::new(None).unwrap().cases(false).into_iter().enumerate();
     let chosen = traction.filter(|(number, case)| number % EVERY == 0 || is_hard(&case.name()));
     let cases: Vec<_> = chosen.map(|(_, case)| Case::Traction(Box::new(case))).collect();
     assert!(cases.len() > 150, "{}", cases.len());
@@ -118,7 +148,7 @@ fn the_document_has_every_case() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/fault-campaign.md");
     let text = std::fs::read_to_string(path).unwrap();
     let mut counts = std::collections::BTreeMap::new();
-    for case in cases(true) {
+    for case in Campaign::new(None).unwrap().cases(true) {
         let name = case.name();
         let mut parts = name.split(' ');
         let (system, fault) = (parts.next().unwrap().to_owned(), parts.next().unwrap().to_owned());

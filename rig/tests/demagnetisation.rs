@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use tractive_rig::analysis::Figures;
-use tractive_rig::campaign::{Campaign, cases};
+use tractive_rig::campaign::Campaign;
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::{Recorded, Recording};
 
@@ -49,9 +49,10 @@ fn the_campaign_tells_the_lowest_current_of_a_fault() {
         case.name() == "pmasynrm angle-jump square 6000 motoring"
             || case.name().contains("angle-jump 6000 motoring")
     };
-    let all = cases(false);
+    let campaign = Campaign::new(None).unwrap();
+    let all = campaign.cases(false);
     let case = all.iter().find(named).unwrap_or_else(|| panic!("{:?}", all[9].name()));
-    let outcome = Campaign::new(None).unwrap().run(case).unwrap();
+    let outcome = campaign.run(case).unwrap();
     assert_eq!(outcome.safe_state, "short circuit, lower");
     assert!(
         outcome.lowest_id_a < -220.0

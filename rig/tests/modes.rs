@@ -77,7 +77,7 @@ fn the_drive_goes_up_and_down_its_ladder() {
 #[test]
 fn the_campaign_counts_faults_in_it() {
     let drive = traction::Drive::new(None).unwrap().on(WITH_MID5);
-    let mut cases = traction::cases(false);
+    let mut cases = drive.cases(false);
     cases.retain(|case| case.name().starts_with("pmasynrm uh-stuck-off 1950 "));
     let outcomes: Vec<_> = cases.iter().map(|case| drive.run(case).unwrap()).collect();
     assert!(!outcomes.is_empty());

@@ -72,6 +72,12 @@ pub struct SensorErrors {
 pub type SensorFailure = (&'static str, CurrentFault, &'static [Fault], Option<f64>);
 
 impl SensorErrors {
+    /// The errors of sensors for so many times the currents.
+    pub const fn times(&self, scale: f64) -> Self {
+        let Self { offset_a, noise_a, range_a, .. } = *self;
+        Self { offset_a: scale * offset_a, noise_a: scale * noise_a, range_a: scale * range_a, ..*self }
+    }
+
     /// The failures of every phase's sensor.
     pub const fn failures(&self) -> [SensorFailure; 6] {
         const SUM: &[Fault] = &[Fault::PhaseSum];

@@ -22,6 +22,7 @@ pub use action::Action;
 pub use outcome::Outcome;
 
 use crate::ablation::Ablation;
+use crate::machine::Machine;
 use crate::scenario::traction::PatternsName;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
@@ -48,13 +49,19 @@ impl Case {
 /// The machines of both systems, with one protection off or none.
 pub struct Campaign {
     traction: traction::Drive,
-    dual: dual::Drive,
+    /// `None` where the two-level drive's machine is the user's own.
+    dual: Option<dual::Drive>,
 }
 
 impl Campaign {
     /// Both drives.
     pub fn new(without: Option<Ablation>) -> Result<Self> {
-        Ok(Self { traction: traction::Drive::new(without)?, dual: dual::Drive::new(without)? })
+        Ok(Self { traction: traction::Drive::new(without)?, dual: Some(dual::Drive::new(without)?) })
+    }
+
+    /// The two-level drive alone, of any machine.
+    pub fn of(machine: Machine, without: Option<Ablation>) -> Result<Self> {
+        Ok(Self { traction: traction::Drive::of(machine, without)?, dual: None })
     }
 
     /// The same with other pulse patterns.
@@ -62,11 +69,23 @@ impl Campaign {
         Self { traction: self.traction.with(patterns), ..self }
     }
 
+    /// See [`traction::Drive::most_rpm`].
+    pub fn most_rpm(&self) -> Option<f64> {
+        self.traction.most_rpm()
+    }
+
+    /// Every case; of the fast ones each fault in each mode once at least.
+    pub fn cases(&self, fast: bool) -> Vec<Case> {
+        let traction = self.traction.cases(fast).into_iter().map(|case| Case::Traction(Box::new(case)));
+        let dual = self.dual.iter().flat_map(|_| dual::cases(fast));
+        traction.chain(dual.map(Case::Dual)).collect()
+    }
+
     /// Runs one case.
     pub fn run(&self, case: &Case) -> Result<Outcome> {
         match case {
             Case::Traction(case) => self.traction.run(case),
-            Case::Dual(case) => self.dual.run(case),
+            Case::Dual(case) => self.dual.as_ref().context("no case of this machine")?.run(case),
         }
     }
 
@@ -79,10 +98,4 @@ impl Campaign {
         };
         cases.par_iter().map(run).collect()
     }
-}
-
-/// Every case; of the fast ones each fault in each mode once at least.
-pub fn cases(fast: bool) -> Vec<Case> {
-    let traction = traction::cases(fast).into_iter().map(|case| Case::Traction(Box::new(case)));
-    traction.chain(dual::cases(fast).into_iter().map(Case::Dual)).collect()
 }

@@ -9,6 +9,10 @@ use std::path::PathBuf;
 /// The options of a campaign.
 #[derive(Args, Clone, Debug)]
 pub struct CampaignOptions {
+    /// A folder of tables/, or the path of any machine folder: the two-level drive's cases with this machine alone, their speeds, currents, voltages and line scaled
+    /// to it; default the 180 kW machine, and the ZS9.
+    #[arg(long, value_name = "MACHINE", conflicts_with_all = ["doc", "healthy", "random", "merge"])]
+    pub machine: Option<String>,
     /// Each fault of each kind once in each mode, instead of every case.
     #[arg(long)]
     pub fast: bool,

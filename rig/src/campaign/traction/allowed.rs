@@ -7,8 +7,8 @@ use crate::bench::Observed;
 use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
 use crate::inject::traction::Kind;
-use crate::run::CLOCK;
 use core::f64::consts::TAU;
+use tractive::protection::SafeState;
 
 impl Drive {
     pub(super) fn allowed(&self, case: &Case, seen: &Seen, safe_torque_nm: f64) -> Allowed {
@@ -24,6 +24,10 @@ impl Drive {
         let current_a = match case.fault.cause {
             // Flux linkage that is there when a device fails cannot leave a machine that is shorted; nothing the gates do is better.
             Cause::Bench(Kind::Device(_)) => most_a.max(FORCED * observed.stored.short_circuit_a),
+            // Nor can that of magnets whose EMF is above the link.
+            _ if seen.trip.is_some_and(|trip| trip.safe != SafeState::GatesOff) => {
+                most_a.max(FORCED * observed.stored.short_circuit_a)
+            }
             _ => most_a,
         };
         let udc_v = self.forced_udc_v(case, observed);
@@ -90,7 +94,7 @@ impl Drive {
     /// The rise of the link between a sample at the trip level and safe gates, in V.
     fn link_rise_v(&self, capacitance_f: f64) -> f64 {
         let most_a = 2.0 * CURRENT_SHARE * self.machine.folder.parameters.trip_current_a;
-        let time_s = f64::from(CLOCK.control_s()) + SAFE_STATE_S;
+        let time_s = f64::from(self.clock.control_s()) + SAFE_STATE_S;
         most_a / capacitance_f * time_s
     }
 

@@ -3,6 +3,7 @@
 use super::STAGES;
 use super::conditions::Conditions;
 use super::faults::{Cause, faults};
+use super::scale::Scale;
 use crate::campaign::Action;
 use crate::campaign::action::{LEAD_S, fault_s};
 use crate::campaign::fault::Named;
@@ -24,7 +25,8 @@ const fn point(speed_rpm: f64, share: f64, fast: bool) -> Point {
     Point { speed_rpm, share, fast }
 }
 
-/// The points at which the faults come: every mode at several speeds. Patterns of square wave need torque below 4,455 r/min.
+/// The points at which the faults come, of a machine of 6,000 r/min: every mode of the 180 kW machine at several speeds. Patterns of square wave need torque below
+/// 4,455 r/min.
 const POINTS: [Point; 18] = [
     point(0.0, 0.8, false),
     point(100.0, 0.8, false),
@@ -46,11 +48,8 @@ const POINTS: [Point; 18] = [
     point(6000.0, 0.8, true),
 ];
 
-/// From where a rotor runs away, in r/min: it must be above 6,600 in time.
+/// From where a rotor runs away, in r/min of such a machine: it must be above 6,600 in time.
 pub(super) const RUNAWAY_FROM_RPM: f64 = 5_000.0;
-
-/// The speed up to which the temperature sensors fail, in r/min: faster, the EMF is above the link, and the drive shorts the machine before anybody enables it.
-const OPERATED_TO_RPM: f64 = 4_500.0;
 
 impl Named<Cause> {
     /// `true` if it comes at rest, and the rotor is pushed off.
@@ -58,12 +57,11 @@ impl Named<Cause> {
         self.name.ends_with("at-rest")
     }
 
-    /// `true` if it can come there.
+    /// `true` if it can come at a point of a machine of 6,000 r/min.
     fn fits(&self, point: &Point) -> bool {
         let speed_rpm = point.speed_rpm.abs();
         match self.cause {
             Cause::Runaway => speed_rpm >= RUNAWAY_FROM_RPM,
-            Cause::Sensor(..) => speed_rpm <= OPERATED_TO_RPM,
             Cause::Bench(Kind::Angle(AngleFault::Frozen | AngleFault::Reversed)) => {
                 self.needs_rest() == (speed_rpm == 0.0)
             }
@@ -97,14 +95,18 @@ impl Case {
     }
 }
 
-/// Every case; of the fast ones each fault of each kind in each mode.
-pub fn cases(fast: bool) -> Vec<Case> {
+/// Every case of a machine, of the faults that can come to it at a speed in r/min; of the fast ones each fault of each kind in each mode.
+pub fn cases(fast: bool, scale: &Scale, can_come: impl Fn(&Cause, f64) -> bool) -> Vec<Case> {
     let mut list = Vec::new();
-    for fault in faults() {
+    for fault in faults(scale) {
         for point in POINTS {
             for action in Action::ALL {
                 let slow = fault.needs_rest() || fault.cause == Cause::Runaway;
-                if !fault.fits(&point) || (fast && !(fault.fast && (point.fast || slow))) {
+                let speed_rpm = scale.speed * point.speed_rpm;
+                if !fault.fits(&point)
+                    || !can_come(&fault.cause, speed_rpm)
+                    || (fast && !(fault.fast && (point.fast || slow)))
+                {
                     continue;
                 }
                 let at_s = match fault.cause {
@@ -112,7 +114,9 @@ pub fn cases(fast: bool) -> Vec<Case> {
                     Cause::Machine(..) => -LEAD_S,
                     _ => fault_s(list.len()),
                 };
-                list.push(Case { fault: fault.clone(), point, action, at_s, conditions: Conditions::SOUND });
+                let conditions = Conditions { filter: scale.filter(), ..Conditions::SOUND };
+                let point = Point { speed_rpm, ..point };
+                list.push(Case { fault: fault.clone(), point, action, at_s, conditions });
             }
         }
     }

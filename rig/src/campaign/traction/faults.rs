@@ -1,5 +1,6 @@
 //! The faults of the PMaSynRM drive.
 
+use super::scale::Scale;
 use crate::campaign::fault::{BENT, Faults, Named, SensorErrors, UNFELT};
 use crate::inject::sensor::{AngleFault, CurrentFault};
 use crate::inject::traction::{Kind, SupplyFault};
@@ -20,8 +21,11 @@ pub enum Cause {
     Sensor(usize, Wire),
 }
 
-/// The errors of the current sensors; their converters' range is a quarter above the trip level.
+/// The errors of the 180 kW machine's current sensors; their converters' range is a quarter above the trip level.
 const SENSORS: SensorErrors = SensorErrors { offset_a: 60.0, scale: 1.5, noise_a: 30.0, range_a: 379.2 };
+/// The errors of one of them that nobody need feel, in A.
+const SMALL_OFFSET_A: f64 = 5.0;
+const SMALL_NOISE_A: f64 = 2.0;
 
 /// Mean torque error where the machine differs by a fifth from its map, as a share of the largest torque.
 const ANOTHER_MACHINE: f64 = 0.25;
@@ -32,12 +36,12 @@ impl From<Kind> for Cause {
     }
 }
 
-/// Every fault, in its order.
-pub fn faults() -> Vec<Named<Cause>> {
+/// Every fault of a machine, in its order.
+pub fn faults(scale: &Scale) -> Vec<Named<Cause>> {
     let mut list = Faults::beginning_with(Kind::Elsewhere);
-    currents(&mut list);
+    currents(&mut list, scale.current);
     angles(&mut list);
-    supply(&mut list);
+    supply(&mut list, scale.voltage);
     list.add("overspeed", Cause::Runaway, &[Fault::Overspeed], None, true);
     legs(&mut list);
     list.add_control(Kind::Control, Kind::DemandNotFinite);
@@ -67,19 +71,29 @@ fn temperatures(list: &mut Faults<Cause>) {
     }
 }
 
-/// The current sensors.
-fn currents(list: &mut Faults<Cause>) {
+/// The current sensors, of so many times the 180 kW machine's currents.
+fn currents(list: &mut Faults<Cause>, scale: f64) {
+    let sensors = SENSORS.times(scale);
     for (phase, letter) in ["u", "v", "w"].into_iter().enumerate() {
         let not_finite = ("not-finite", CurrentFault::NotFinite, &[Fault::NotFinite][..], None);
-        for (what, fault, names, share) in SENSORS.failures().into_iter().chain([not_finite]) {
+        for (what, fault, names, share) in sensors.failures().into_iter().chain([not_finite]) {
             let name = format!("current-{letter}-{what}");
             list.add(&name, Kind::Current(phase, fault), names, share, phase == 0);
         }
     }
     let small = |fault| Kind::Current(1, fault);
-    list.add("current-v-offset-5A", small(CurrentFault::Offset(5.0)), &[], Some(BENT), true);
+    let [offset_a, noise_a] = [SMALL_OFFSET_A, SMALL_NOISE_A].map(|of_a| two_digits(scale * of_a));
+    let offset = small(CurrentFault::Offset(offset_a));
+    list.add(&format!("current-v-offset-{offset_a}A"), offset, &[], Some(BENT), true);
     list.add("current-v-scaled-3%", small(CurrentFault::Scaled(1.03)), &[], Some(BENT), true);
-    list.add("current-v-noisy-2A", small(CurrentFault::Noisy(2.0)), &[], Some(UNFELT), true);
+    let noisy = small(CurrentFault::Noisy(noise_a));
+    list.add(&format!("current-v-noisy-{noise_a}A"), noisy, &[], Some(UNFELT), true);
+}
+
+/// A value above 0, to two digits.
+fn two_digits(value: f64) -> f64 {
+    let steps_per_one = 10.0_f64.powi(1 - value.log10().floor() as i32);
+    (value * steps_per_one).round() / steps_per_one
 }
 
 /// The angle sensor.
@@ -97,15 +111,16 @@ fn angles(list: &mut Faults<Cause>) {
     list.add("angle-off-2deg", Kind::Angle(AngleFault::Jump(2.0)), &[], Some(BENT), true);
 }
 
-/// The line and its link.
-fn supply(list: &mut Faults<Cause>) {
+/// The line and its link, of so many times the 180 kW machine's voltage.
+fn supply(list: &mut Faults<Cause>, scale: f64) {
     const LINK: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage];
     const OVER: &[Fault] = &[Fault::DcOvervoltage, Fault::Overcurrent];
+    const UNDER: &[Fault] = &[Fault::DcUndervoltage, Fault::Overcurrent];
     const SWINGS: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage, Fault::Overcurrent];
-    let swinging = |amplitude_v, hz| Kind::Supply(SupplyFault::Swinging(amplitude_v, hz));
+    let swinging = |amplitude_v, hz| Kind::Supply(SupplyFault::Swinging(scale * amplitude_v, hz));
     list.add("link-lost", Kind::Supply(SupplyFault::Lost), LINK, Some(UNFELT), true);
-    list.add("link-over", Kind::Supply(SupplyFault::To(2300.0)), OVER, None, true);
-    list.add("link-under", Kind::Supply(SupplyFault::To(600.0)), &[Fault::DcUndervoltage], None, true);
+    list.add("link-over", Kind::Supply(SupplyFault::To(scale * 2_300.0)), OVER, None, true);
+    list.add("link-under", Kind::Supply(SupplyFault::To(scale * 600.0)), UNDER, None, true);
     list.add("link-swings", swinging(300.0, 40.0), SWINGS, Some(UNFELT), true);
     list.add("link-sways", swinging(150.0, 16.7), &[], Some(BENT), true);
 }

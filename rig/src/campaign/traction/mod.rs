@@ -6,11 +6,14 @@ mod conditions;
 mod drive_cycle;
 mod faults;
 pub mod random;
+mod scale;
 mod sensors;
 
-pub use cases::{Case, cases};
+pub use cases::Case;
+use cases::cases;
 pub use conditions::Conditions;
 pub use drive_cycle::{CycleResult, DriveCycle};
+pub use scale::Scale;
 
 use super::Outcome;
 use super::action::{FAULT_S, LEAD_S, Stages};
@@ -20,9 +23,10 @@ use crate::bench::{self, Bench, Flaws, Limits, Simulated, Supply};
 use crate::inject::Injection;
 use crate::inject::traction::Kind;
 use crate::machine::Machine;
-use crate::plant::{LineFilter, Plant, PlantSettings, SpeedSource};
+use crate::options::usual_min_pulse_us;
+use crate::plant::{Plant, PlantSettings, SpeedSource, Stator};
 use crate::run::traction::Tasks;
-use crate::run::{CLOCK, Interrupts};
+use crate::run::{self, Interrupts};
 use crate::scenario::System;
 use crate::scenario::traction::{PatternsName, Traction};
 use crate::trace::Row;
@@ -33,7 +37,7 @@ use tractive::control::{ControlLaw, Demand, Region};
 use tractive::drive::traction::Settings;
 use tractive::machine::Tables;
 use tractive::modulation::{Ladder, Mode, SwitchLimits};
-use tractive::time::Instant;
+use tractive::time::{Clock, Instant};
 
 /// Full torque is reversed in 0.15 s where it cannot step; the aftermath is several electrical turns, and the link's oscillation.
 const STAGES: Stages = Stages { torque_s: -0.09, turn_s: 0.1, end_s: 0.3, aftermath_s: 0.06 };
@@ -41,10 +45,13 @@ const STAGES: Stages = Stages { torque_s: -0.09, turn_s: 0.1, end_s: 0.3, afterm
 const MEAN_S: f64 = 0.04;
 /// Step of a case's trace, in s.
 const TRACE_STEP_S: f64 = 50e-6;
-/// The acceleration of a rotor that is pushed off, in r/min per s.
+/// The acceleration of a rotor that is pushed off, in r/min per s of a machine of 6,000 r/min.
 const PUSH_RPM_S: f64 = 2_000.0;
-/// The acceleration of a rotor that runs away, in r/min per s: twice what the machine itself can do.
+/// The acceleration of a rotor that runs away, likewise: twice what the 180 kW machine itself can do.
 const RUNAWAY_RPM_S: f64 = 12_000.0;
+
+/// The EMF up to which the gates of a drive that waits for an operator are off, over the nominal link: faster, the machine is shorted.
+const RESTING: f64 = 0.9;
 
 /// The way of a run.
 struct Way {
@@ -58,6 +65,8 @@ struct Way {
 pub struct Drive {
     /// The machine that it drives.
     pub machine: Machine,
+    scale: Scale,
+    clock: Clock,
     tables: &'static Tables,
     without: Option<Ablation>,
     ladder: Ladder,
@@ -68,9 +77,46 @@ pub struct Drive {
 impl Drive {
     /// For the 180 kW machine.
     pub fn new(without: Option<Ablation>) -> Result<Self> {
-        let machine = Machine::load(Traction::MACHINE)?;
+        Self::of(Machine::load(Traction::MACHINE)?, without)
+    }
+
+    /// For any machine, with the rate of control that goes with its devices.
+    ///
+    /// # Errors
+    /// A machine that the drive would refuse at start-up.
+    pub fn of(machine: Machine, without: Option<Ablation>) -> Result<Self> {
         let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
-        Ok(Self { machine, tables, without, ladder: Ladder::PAPER, carrier_share: 1.0 })
+        let clock = run::clock(Clock::control_hz(tables.ratings.max_switching_hz));
+        let scale = Scale::of(&machine);
+        let drive =
+            Self { machine, scale, clock, tables, without, ladder: Ladder::PAPER, carrier_share: 1.0 };
+        Settings::new(clock, drive.devices(0)).check(drive.machine.tables).map_err(run::refused)?;
+        Ok(drive)
+    }
+
+    /// Every case of it; of the fast ones each fault of each kind in each mode.
+    pub fn cases(&self, fast: bool) -> Vec<Case> {
+        let (most_rpm, rest_rpm) = (self.most_rpm().unwrap_or(f64::INFINITY), self.emf_rpm(RESTING));
+        let can_come = |cause: &Cause, speed_rpm: f64| {
+            let limit_rpm = if matches!(cause, Cause::Sensor(..)) { rest_rpm } else { f64::INFINITY };
+            speed_rpm.abs() <= most_rpm.min(limit_rpm)
+        };
+        cases(fast, &self.scale, can_come)
+    }
+
+    /// The speed up to which a machine may coast whose short circuit begins with a current above the trip level, in r/min: faster, its EMF drives as much through
+    /// the diodes; `None` where it may at every speed.
+    pub fn most_rpm(&self) -> Option<f64> {
+        let stator = Stator::new(&self.machine.folder, &PlantSettings::default());
+        let most_a = stator.peak_on_flux_circle_a(0.0, 0.0);
+        (most_a > self.machine.folder.parameters.trip_current_a).then(|| self.emf_rpm(1.0))
+    }
+
+    /// The speed at which the EMF between the lines is this share of the nominal link, in r/min.
+    fn emf_rpm(&self, share: f64) -> f64 {
+        let ratings = &self.machine.tables.ratings;
+        let wb = f64::from(ratings.magnet_flux_wb * ratings.pole_pairs) * 3.0_f64.sqrt();
+        share * self.machine.folder.parameters.dc_link_nominal_v / wb * (60.0 / core::f64::consts::TAU)
     }
 
     /// The same with the modes of another ladder.
@@ -95,7 +141,7 @@ impl Drive {
     fn run_watched(&self, case: &Case) -> Result<(Outcome, Way)> {
         let mut bench = self.bench(case);
         let devices = self.devices(case.conditions.dead_time_ticks);
-        let tick_s = f64::from(CLOCK.tick_s);
+        let tick_s = f64::from(self.clock.tick_s);
         let fault = Instant(((LEAD_S + case.at_s) / tick_s) as u32);
         let region = Cell::new(Region::Mtpa);
         let mut tasks = self.tasks(devices).doing(|law, now, _| {
@@ -134,18 +180,20 @@ impl Drive {
 
     fn devices(&self, dead_time_ticks: u32) -> SwitchLimits {
         let carrier_hz = self.carrier_share * self.tables.ratings.max_switching_hz;
-        SwitchLimits::new(250, dead_time_ticks, carrier_hz, &CLOCK)
+        let min_pulse_s = 1e-6 * usual_min_pulse_us(self.machine.folder.parameters.max_switching_hz);
+        let min_pulse_ticks = (min_pulse_s * f64::from(self.clock.ticks_per_s)).round() as u32;
+        SwitchLimits::new(min_pulse_ticks, dead_time_ticks, carrier_hz, &self.clock)
     }
 
     fn tasks<'a>(&self, devices: SwitchLimits) -> Tasks<'a> {
-        let settings = Settings::new(CLOCK, devices);
+        let settings = Settings::new(self.clock, devices);
         Tasks::new(self.tables, settings, devices.shortest_half_ticks).on(self.ladder).without(self.without)
     }
 
     /// A sound bench.
     fn bench_settings(&self, duration_s: f64, trace_step_s: f64) -> bench::Settings {
         bench::Settings {
-            clock: CLOCK,
+            clock: self.clock,
             first_half_ticks: self.devices(0).shortest_half_ticks,
             dead_time_ticks: 0,
             lead_s: LEAD_S,
@@ -154,7 +202,7 @@ impl Drive {
             udc_v: self.machine.folder.parameters.dc_link_nominal_v,
             link_steps: Vec::new(),
             flaws: Flaws::default(),
-            supply: Supply::Line(LineFilter::TRACTION),
+            supply: Supply::Line(self.scale.filter()),
             injection: Some(Injection { kind: Kind::Elsewhere, at_s: -LEAD_S }),
             limits: Limits::NONE,
         }
@@ -183,14 +231,16 @@ impl Drive {
             vec![(LEAD_S + at_s, point.speed_rpm), (LEAD_S + STAGES.end_s, end_rpm)]
         };
         let (kind, machine, speed) = match case.fault.cause {
-            Cause::Bench(kind) if case.fault.needs_rest() => (kind, machine, faster(PUSH_RPM_S)),
+            Cause::Bench(kind) if case.fault.needs_rest() => {
+                (kind, machine, faster(PUSH_RPM_S * self.scale.speed))
+            }
             Cause::Bench(kind) => (kind, machine, steady()),
             Cause::Machine(flux_scale, resistance_scale) => (
                 Kind::Elsewhere,
                 PlantSettings { flux_scale, resistance_scale, ..PlantSettings::default() },
                 steady(),
             ),
-            Cause::Runaway => (Kind::Elsewhere, machine, faster(RUNAWAY_RPM_S)),
+            Cause::Runaway => (Kind::Elsewhere, machine, faster(RUNAWAY_RPM_S * self.scale.speed)),
             Cause::Sensor(..) => (Kind::Elsewhere, machine, steady()),
         };
         let settings = bench::Settings {
@@ -203,7 +253,7 @@ impl Drive {
                     parameters.trip_dc_over_v / (1.0 + conditions.flaws.udc_gain),
                 ),
                 speed_rpm: parameters.trip_speed_rpm,
-                sampling_ticks: u64::from(CLOCK.control_ticks),
+                sampling_ticks: u64::from(self.clock.control_ticks),
                 ..Limits::NONE
             },
             dead_time_ticks: conditions.dead_time_ticks,

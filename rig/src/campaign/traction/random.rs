@@ -2,7 +2,7 @@
 
 use super::cases::{Point, RUNAWAY_FROM_RPM};
 use super::faults::{Cause, faults};
-use super::{Case, Conditions, Drive, STAGES, Way};
+use super::{Case, Conditions, Drive, STAGES, Scale, Way};
 use crate::bench::Flaws;
 use crate::campaign::Action;
 use crate::campaign::action::LEAD_S;
@@ -59,7 +59,7 @@ const COASTING_FROM: f64 = 0.9;
 
 /// The fault of a coordinate. Another machine is no fault here: it is drawn. Temperature sensors have cases of their own.
 fn fault(coordinate: f64) -> Result<Named<Cause>> {
-    let mut list = faults();
+    let mut list = faults(&Scale::ONE);
     list.retain(|fault| !matches!(fault.cause, Cause::Machine(..) | Cause::Sensor(..)));
     let above = (coordinate - SOUND_SHARE) / (1.0 - SOUND_SHARE);
     let others = list.len() - 1;

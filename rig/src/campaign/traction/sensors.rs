@@ -42,11 +42,11 @@ impl Drive {
     pub(super) fn run_sensor(&self, case: &Case, place: usize, wire: Wire) -> Result<Outcome> {
         let devices = self.devices(0);
         let ratings = &self.machine.tables.ratings;
-        let LineFilter { capacitance_f, .. } = LineFilter::TRACTION;
+        let DcLinkSettings { capacitance_f, precharge_ohm, discharge_ohm, .. } = self.sensor_link();
         let line = Line::rated(
             ratings,
-            (PRECHARGE_OHM * capacitance_f) as f32,
-            (DISCHARGE_OHM * capacitance_f) as f32,
+            (precharge_ohm * capacitance_f) as f32,
+            (discharge_ohm * capacitance_f) as f32,
         );
         let mut bench = self.sensor_bench(case, place, wire);
         let mut tasks = self.tasks(devices).operated_on(Some(line)).warmed_by(Some(&THERMAL));
@@ -70,7 +70,6 @@ impl Drive {
     }
 
     fn sensor_bench(&self, case: &Case, place: usize, wire: Wire) -> Bench {
-        let parameters = &self.machine.folder.parameters;
         let (point, action, ratings) = (case.point, case.action, &self.machine.tables.ratings);
         let full_nm = (point.share * self.machine.envelope_nm(point.speed_rpm)).copysign(point.speed_rpm);
         let commander = move |t_s: f64| Request {
@@ -87,7 +86,7 @@ impl Drive {
         let plan = LinePlan {
             starts_charged: true,
             heat: Some(heat),
-            ..LinePlan::new(link(parameters.dc_link_nominal_v), Box::new(commander))
+            ..LinePlan::new(self.sensor_link(), Box::new(commander))
         };
         let settings = bench::Settings {
             lead_s: LEAD_S,
@@ -101,24 +100,26 @@ impl Drive {
         let nothing = |_: f64| (Demand::default(), true);
         Bench::new(plant, Box::new(nothing), &settings).with_line(Some(plan))
     }
-}
 
-/// Precharge and discharge resistor, in ohm.
-const PRECHARGE_OHM: f64 = 50.0;
-const DISCHARGE_OHM: f64 = 100.0;
-
-/// The campaign's line at a voltage, in V, behind contactors.
-fn link(voltage_v: f64) -> DcLinkSettings {
-    let LineFilter { inductance_h, resistance_ohm, capacitance_f } = LineFilter::TRACTION;
-    DcLinkSettings {
-        capacitance_f,
-        source: Source { voltage_v, resistance_ohm, inductance_h, reversible: true, live: true },
-        precharge_ohm: PRECHARGE_OHM,
-        discharge_ohm: DISCHARGE_OHM,
-        auxiliary_ohm: f64::INFINITY,
-        chopper_ohm: 12.0,
+    /// The campaign's line behind contactors.
+    fn sensor_link(&self) -> DcLinkSettings {
+        let LineFilter { inductance_h, resistance_ohm, capacitance_f } = self.scale.filter();
+        let voltage_v = self.machine.folder.parameters.dc_link_nominal_v;
+        DcLinkSettings {
+            capacitance_f,
+            source: Source { voltage_v, resistance_ohm, inductance_h, reversible: true, live: true },
+            precharge_ohm: PRECHARGE_OHM * self.scale.impedance,
+            discharge_ohm: DISCHARGE_OHM * self.scale.impedance,
+            auxiliary_ohm: f64::INFINITY,
+            chopper_ohm: CHOPPER_OHM * self.scale.impedance,
+        }
     }
 }
+
+/// Resistors for precharge, discharge and braking of the 180 kW machine's link, in ohm.
+const PRECHARGE_OHM: f64 = 50.0;
+const DISCHARGE_OHM: f64 = 100.0;
+const CHOPPER_OHM: f64 = 12.0;
 
 /// The operator's fault with the safe state that the drive found itself, if any, and what was observed from the last edge on: where nobody orders a
 /// safe state, the pulses end.
