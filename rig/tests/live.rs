@@ -3,7 +3,7 @@
 use clap::{Args, FromArgMatches};
 use tractive::operator::State;
 use tractive::protection::Fault;
-use tractive_rig::campaign::traction::{Cause, faults};
+use tractive_rig::campaign::traction::{Cause, Scale, faults};
 use tractive_rig::machine::Machine;
 use tractive_rig::scenario::System;
 use tractive_rig::scenario::traction::{Command, Live, Options, Start, Traction, Turning, Wanted};
@@ -132,7 +132,7 @@ fn wrong(cause: Cause) -> (Live, Option<Fault>) {
 #[test]
 fn every_fault_is_named_as_in_the_campaign() {
     let mut named = 0;
-    for fault in faults().into_iter().skip(1).filter(|fault| fault.fast) {
+    for fault in faults(&Scale::ONE).into_iter().skip(1).filter(|fault| fault.fast) {
         if matches!(fault.cause, Cause::Sensor(..)) {
             continue;
         }
@@ -147,7 +147,7 @@ fn every_fault_is_named_as_in_the_campaign() {
 #[test]
 fn a_fault_is_mended_and_acknowledged_and_the_drive_runs_again() {
     for name in ["current-u-railed", "angle-jump", "control-late", "uh-stuck-on"] {
-        let fault = faults().into_iter().find(|fault| fault.name == name).unwrap();
+        let fault = faults(&Scale::ONE).into_iter().find(|fault| fault.name == name).unwrap();
         let (mut live, named) = wrong(fault.cause);
         assert!(named.is_some(), "{name}");
         live.mend();

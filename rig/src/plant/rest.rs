@@ -169,7 +169,7 @@ mod tests {
         }
     }
 
-    /// What its rotor loses meanwhile is the iron's.
+    /// The iron alone takes energy from its rotor.
     #[test]
     fn a_machine_at_rest_gives_nothing_and_takes_what_its_iron_does() {
         for iron_share in [0.0, 1.0] {

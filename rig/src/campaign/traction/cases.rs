@@ -1,9 +1,8 @@
 //! The operating points at which the faults of the PMaSynRM drive come.
 
-use super::STAGES;
 use super::conditions::Conditions;
 use super::faults::{Cause, faults};
-use super::scale::Scale;
+use super::{Drive, STAGES};
 use crate::campaign::Action;
 use crate::campaign::action::{LEAD_S, fault_s};
 use crate::campaign::fault::Named;
@@ -51,6 +50,9 @@ const POINTS: [Point; 18] = [
 /// From where a rotor runs away, in r/min of such a machine: it must be above 6,600 in time.
 pub(super) const RUNAWAY_FROM_RPM: f64 = 5_000.0;
 
+/// The EMF up to which the gates of a drive that waits for an operator are off, over the nominal link: faster, the machine is shorted.
+const RESTING: f64 = 0.9;
+
 impl Named<Cause> {
     /// `true` if it comes at rest, and the rotor is pushed off.
     pub(super) fn needs_rest(&self) -> bool {
@@ -95,18 +97,22 @@ impl Case {
     }
 }
 
-/// Every case of a machine, of the faults that can come to it at a speed in r/min; of the fast ones each fault of each kind in each mode.
-pub fn cases(fast: bool, scale: &Scale, can_come: impl Fn(&Cause, f64) -> bool) -> Vec<Case> {
-    let mut list = Vec::new();
-    for fault in faults(scale) {
-        for point in POINTS {
-            for action in Action::ALL {
+impl Drive {
+    /// Every case of its machine; of the fast ones each fault of each kind in each mode.
+    pub fn cases(&self, fast: bool) -> Vec<Case> {
+        let (most_rpm, rest_rpm) = (self.most_rpm().unwrap_or(f64::INFINITY), self.emf_rpm(RESTING));
+        let can_come = |fault: &Named<Cause>, speed_rpm: f64| {
+            let limit_rpm = if matches!(fault.cause, Cause::Sensor(..)) { rest_rpm } else { f64::INFINITY };
+            speed_rpm.abs() <= most_rpm.min(limit_rpm)
+        };
+        let mut list = Vec::new();
+        let places = POINTS.into_iter().flat_map(|point| Action::ALL.map(|action| (point, action)));
+        for fault in faults(&self.scale) {
+            for (point, action) in places.clone() {
+                let speed_rpm = self.scale.speed * point.speed_rpm;
                 let slow = fault.needs_rest() || fault.cause == Cause::Runaway;
-                let speed_rpm = scale.speed * point.speed_rpm;
-                if !fault.fits(&point)
-                    || !can_come(&fault.cause, speed_rpm)
-                    || (fast && !(fault.fast && (point.fast || slow)))
-                {
+                let chosen = !fast || (fault.fast && (point.fast || slow));
+                if !chosen || !fault.fits(&point) || !can_come(&fault, speed_rpm) {
                     continue;
                 }
                 let at_s = match fault.cause {
@@ -114,11 +120,11 @@ pub fn cases(fast: bool, scale: &Scale, can_come: impl Fn(&Cause, f64) -> bool) 
                     Cause::Machine(..) => -LEAD_S,
                     _ => fault_s(list.len()),
                 };
-                let conditions = Conditions { filter: scale.filter(), ..Conditions::SOUND };
+                let conditions = Conditions { filter: self.scale.filter(), ..Conditions::SOUND };
                 let point = Point { speed_rpm, ..point };
                 list.push(Case { fault: fault.clone(), point, action, at_s, conditions });
             }
         }
+        list
     }
-    list
 }

@@ -10,7 +10,6 @@ mod scale;
 mod sensors;
 
 pub use cases::Case;
-use cases::cases;
 pub use conditions::Conditions;
 pub use drive_cycle::{CycleResult, DriveCycle};
 pub use scale::Scale;
@@ -49,9 +48,6 @@ const TRACE_STEP_S: f64 = 50e-6;
 const PUSH_RPM_S: f64 = 2_000.0;
 /// The acceleration of a rotor that runs away, likewise: twice what the 180 kW machine itself can do.
 const RUNAWAY_RPM_S: f64 = 12_000.0;
-
-/// The EMF up to which the gates of a drive that waits for an operator are off, over the nominal link: faster, the machine is shorted.
-const RESTING: f64 = 0.9;
 
 /// The way of a run.
 struct Way {
@@ -94,16 +90,6 @@ impl Drive {
         Ok(drive)
     }
 
-    /// Every case of it; of the fast ones each fault of each kind in each mode.
-    pub fn cases(&self, fast: bool) -> Vec<Case> {
-        let (most_rpm, rest_rpm) = (self.most_rpm().unwrap_or(f64::INFINITY), self.emf_rpm(RESTING));
-        let can_come = |cause: &Cause, speed_rpm: f64| {
-            let limit_rpm = if matches!(cause, Cause::Sensor(..)) { rest_rpm } else { f64::INFINITY };
-            speed_rpm.abs() <= most_rpm.min(limit_rpm)
-        };
-        cases(fast, &self.scale, can_come)
-    }
-
     /// The speed up to which a machine may coast whose short circuit begins with a current above the trip level, in r/min: faster, its EMF drives as much through
     /// the diodes; `None` where it may at every speed.
     pub fn most_rpm(&self) -> Option<f64> {
@@ -113,7 +99,7 @@ impl Drive {
     }
 
     /// The speed at which the EMF between the lines is this share of the nominal link, in r/min.
-    fn emf_rpm(&self, share: f64) -> f64 {
+    pub(super) fn emf_rpm(&self, share: f64) -> f64 {
         let ratings = &self.machine.tables.ratings;
         let wb = f64::from(ratings.magnet_flux_wb * ratings.pole_pairs) * 3.0_f64.sqrt();
         share * self.machine.folder.parameters.dc_link_nominal_v / wb * (60.0 / core::f64::consts::TAU)
