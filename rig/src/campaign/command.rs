@@ -25,12 +25,14 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     if let Some(runs) = options.random {
         return random::command::run(runs, options);
     }
-    let is_usual = options.patterns == PatternsName::Paper;
+    let machine = options.machine()?;
+    let patterns = options.patterns(machine.as_ref());
+    let is_usual = patterns == PatternsName::Paper;
     ensure!(
         options.doc.is_none() || is_usual,
         "--doc: of other patterns the campaign at random alone has a part"
     );
-    let campaign = campaign(options)?;
+    let campaign = campaign(machine, options.without)?.with(patterns);
     if let Some(most_rpm) = campaign.most_rpm() {
         eprintln!(
             "no case above {most_rpm:.0} r/min: there the EMF alone makes a current above trip_current_a flow through the diodes"
@@ -42,7 +44,7 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
         "fast": options.fast,
         "only": options.only,
         "without": options.without.map(Ablation::name),
-        "patterns": options.patterns,
+        "patterns": patterns,
     });
     if let Some(shard) = options.shard {
         let plan = Plan::new(FAULTS, given, cases.len(), Outcome::COLUMNS)?;
@@ -70,12 +72,11 @@ pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
 }
 
 /// The drives that are chosen.
-fn campaign(options: &CampaignOptions) -> Result<Campaign> {
-    let campaign = match &options.machine {
-        Some(machine) => Campaign::of(Machine::load(machine)?, options.without)?,
-        None => Campaign::new(options.without)?,
-    };
-    Ok(campaign.with(options.patterns))
+fn campaign(machine: Option<Machine>, without: Option<Ablation>) -> Result<Campaign> {
+    match machine {
+        Some(machine) => Campaign::of(machine, without),
+        None => Campaign::new(without),
+    }
 }
 
 /// The cases that are chosen.

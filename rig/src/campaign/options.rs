@@ -1,8 +1,10 @@
 //! The options of `campaign`.
 
 use crate::ablation::Ablation;
+use crate::machine::Machine;
 use crate::scenario::traction::PatternsName;
 use crate::shards::Shard;
+use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -22,9 +24,9 @@ pub struct CampaignOptions {
     /// One protection off: a fault's name, short_circuit or leg_safe_state. The cases that are lost are then listed.
     #[arg(long, value_name = "PROTECTION")]
     pub without: Option<Ablation>,
-    /// The pulse patterns of the PMaSynRM drive above the free carrier.
-    #[arg(long, value_enum, default_value = "paper")]
-    pub patterns: PatternsName,
+    /// The pulse patterns of the two-level drive above the free carrier; default those of --machine, or the paper's.
+    #[arg(long, value_enum)]
+    pub patterns: Option<PatternsName>,
     /// Folder for campaign.csv, summary.json and report.html.
     #[arg(long, default_value = "target/tractive/campaign")]
     pub out: PathBuf,
@@ -59,4 +61,17 @@ pub struct CampaignOptions {
     /// Print the totals as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+impl CampaignOptions {
+    /// The machine of --machine.
+    pub fn machine(&self) -> Result<Option<Machine>> {
+        self.machine.as_deref().map(Machine::load).transpose()
+    }
+
+    /// The pulse patterns: those that are named, else those of a machine of one's own.
+    pub fn patterns(&self, machine: Option<&Machine>) -> PatternsName {
+        let own = || machine.map_or(PatternsName::Paper, |machine| machine.folder.parameters.patterns.into());
+        self.patterns.unwrap_or_else(own)
+    }
 }

@@ -79,7 +79,7 @@ pub fn run(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
     let course = Course {
         pieces,
         piece_s: minutes * 60.0 / pieces as f64,
-        drive: traction::Drive::new(options.without)?.with(options.patterns),
+        drive: traction::Drive::new(options.without)?.with(options.patterns(None)),
         dual: dual::Drive::new(options.without)?,
         systems,
         options,
@@ -91,7 +91,7 @@ pub fn run(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
             "only": options.only,
             "without": options.without.map(crate::ablation::Ablation::name),
             "blocks": options.blocks,
-            "patterns": options.patterns,
+            "patterns": options.patterns(None),
             "seed": options.seed,
         });
         let plan = Plan::new(HEALTHY, configuration, runs, COLUMNS)?;

@@ -67,7 +67,7 @@ impl Random {
 /// Runs the campaign. Exit code 1 where a run is uncaught, or the document is not up to date.
 pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
     ensure!(runs > 0, "--random 0: must be at least 1");
-    let random = Random::new(runs, options.seed, options.patterns)?;
+    let random = Random::new(runs, options.seed, options.patterns(None))?;
     if let Some(run) = options.run {
         let run = random.run(run)?;
         crate::say!("{}", words(&run));
@@ -78,7 +78,7 @@ pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
         return Ok(ExitCode::from(u8::from(lost)));
     }
     let configuration =
-        serde_json::to_value(Configuration { seed: options.seed, patterns: options.patterns })?;
+        serde_json::to_value(Configuration { seed: options.seed, patterns: options.patterns(None) })?;
     let plan = Plan::new(RANDOM, configuration, runs, &Run::columns())?;
     if let Some(shard) = options.shard {
         shards::run(&plan, shard, &options.out, |run| random.run(run)?.row())?;
@@ -97,7 +97,7 @@ pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
     let mut good = finish(&merged, &options.out)?;
     if let Some(path) = &options.doc {
         let text = coverage(&Run::of(&merged)?);
-        let part = match options.patterns {
+        let part = match options.patterns(None) {
             PatternsName::Paper => Part::Coverage,
             PatternsName::Optimal => Part::OptimalCoverage,
         };
