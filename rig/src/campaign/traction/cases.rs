@@ -50,9 +50,6 @@ const POINTS: [Point; 18] = [
 /// From where a rotor runs away, in r/min of such a machine: it must be above 6,600 in time.
 pub(super) const RUNAWAY_FROM_RPM: f64 = 5_000.0;
 
-/// The EMF up to which the gates of a drive that waits for an operator are off, over the nominal link: faster, the machine is shorted.
-const RESTING: f64 = 0.9;
-
 impl Named<Cause> {
     /// `true` if it comes at rest, and the rotor is pushed off.
     pub(super) fn needs_rest(&self) -> bool {
@@ -100,10 +97,12 @@ impl Case {
 impl Drive {
     /// Every case of its machine; of the fast ones each fault of each kind in each mode.
     pub fn cases(&self, fast: bool) -> Vec<Case> {
-        let (most_rpm, rest_rpm) = (self.most_rpm().unwrap_or(f64::INFINITY), self.emf_rpm(RESTING));
+        // Faster, the EMF is above the link, and the drive shorts the machine before its operator can enable it.
+        let operated_to_rpm = self.rectifying_rpm();
+        let most_rpm = self.most_rpm().unwrap_or(f64::INFINITY);
         let can_come = |fault: &Named<Cause>, speed_rpm: f64| {
-            let limit_rpm = if matches!(fault.cause, Cause::Sensor(..)) { rest_rpm } else { f64::INFINITY };
-            speed_rpm.abs() <= most_rpm.min(limit_rpm)
+            let is_operated = matches!(fault.cause, Cause::Sensor(..));
+            speed_rpm.abs() <= most_rpm && !(is_operated && speed_rpm.abs() > operated_to_rpm)
         };
         let mut list = Vec::new();
         let places = POINTS.into_iter().flat_map(|point| Action::ALL.map(|action| (point, action)));

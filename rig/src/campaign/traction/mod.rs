@@ -95,14 +95,14 @@ impl Drive {
     pub fn most_rpm(&self) -> Option<f64> {
         let stator = Stator::new(&self.machine.folder, &PlantSettings::default());
         let most_a = stator.peak_on_flux_circle_a(0.0, 0.0);
-        (most_a > self.machine.folder.parameters.trip_current_a).then(|| self.emf_rpm(1.0))
+        (most_a > self.machine.folder.parameters.trip_current_a).then(|| self.rectifying_rpm())
     }
 
-    /// The speed at which the EMF between the lines is this share of the nominal link, in r/min.
-    pub(super) fn emf_rpm(&self, share: f64) -> f64 {
+    /// The speed from which on the EMF between the lines is above the nominal link, in r/min.
+    pub(super) fn rectifying_rpm(&self) -> f64 {
         let ratings = &self.machine.tables.ratings;
         let wb = f64::from(ratings.magnet_flux_wb * ratings.pole_pairs) * 3.0_f64.sqrt();
-        share * self.machine.folder.parameters.dc_link_nominal_v / wb * (60.0 / core::f64::consts::TAU)
+        self.machine.folder.parameters.dc_link_nominal_v / wb * (60.0 / core::f64::consts::TAU)
     }
 
     /// The same with the modes of another ladder.
