@@ -7,7 +7,7 @@ use core::f64::consts::TAU;
 use serde_json::Value;
 use tractive::modulation::Mode;
 use tractive_rig::bound;
-use tractive_rig::campaign::traction::{Cause, faults};
+use tractive_rig::campaign::traction::{Cause, Scale, faults};
 use tractive_rig::machine::Machine;
 use tractive_rig::scenario::live::{Command, Start, Turning, Wanted};
 use tractive_rig::scenario::traction::{Live, Options};
@@ -103,7 +103,7 @@ impl Driven for Traction {
 
     fn faults(&self) -> Vec<String> {
         // Its operator knows no temperature sensors.
-        let told = faults().into_iter().skip(1).filter(|fault| !matches!(fault.cause, Cause::Sensor(..)));
+        let told = faults(&Scale::ONE).into_iter().skip(1).filter(|fault| !matches!(fault.cause, Cause::Sensor(..)));
         told.map(|fault| fault.name).collect()
     }
 
@@ -132,7 +132,7 @@ impl Driven for Traction {
     }
 
     fn inject(&mut self, name: &str) -> Result<()> {
-        let fault = faults().into_iter().find(|fault| fault.name == name);
+        let fault = faults(&Scale::ONE).into_iter().find(|fault| fault.name == name);
         match fault.with_context(|| format!("there is no fault `{name}`"))?.cause {
             Cause::Bench(kind) => self.live.inject(kind),
             Cause::Runaway => self.live.run_away(),

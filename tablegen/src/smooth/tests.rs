@@ -94,6 +94,8 @@ fn a_map_that_saturates_goes_on_rising_beyond_its_grid() {
         let [before, after] = [1.0 - 1e-9, 1.0 + 1e-9].map(|by| edge.along(by * edge.straight));
         near(before.near, after.near, 1e-7);
         near(before.share, after.share, 1e-7);
+        // The turn's own way later a quarter of the tangent's slope is left.
+        near(edge.along(1.3 * edge.straight).share, 0.25, 1e-9);
     }
     let [inside, outside] = [-1e-9, 1e-9].map(|by| map.at(6.0 + by, 20.0 + by));
     near(inside.ldd_h, outside.ldd_h, 1e-9);

@@ -229,3 +229,14 @@ fn parameters_that_vanish_are_kept_above_zero() {
         near(f64::from(*saliency), 0.026, 1e-5);
     }
 }
+
+/// Where the torque is the largest the least that counts as saliency is a small part of what there is: of a linear machine the tables have its own everywhere.
+#[test]
+fn tables_of_a_linear_machine_have_its_saliency() {
+    let tables = IPM.folder(&[]).tables();
+    for (id, iq) in [(0.0, 2.0), (-8.0, 11.0), (-20.0, 20.0)] {
+        let [psi_f, saliency] = tables.mtpa.parameters.at(id, iq);
+        near(f64::from(psi_f), 0.2, 1e-6);
+        near(f64::from(saliency), 0.009, 1e-6);
+    }
+}
