@@ -103,7 +103,8 @@ impl Driven for Traction {
 
     fn faults(&self) -> Vec<String> {
         // Its operator knows no temperature sensors.
-        let told = faults(&Scale::ONE).into_iter().skip(1).filter(|fault| !matches!(fault.cause, Cause::Sensor(..)));
+        let told =
+            faults(&Scale::ONE).into_iter().skip(1).filter(|fault| !matches!(fault.cause, Cause::Sensor(..)));
         told.map(|fault| fault.name).collect()
     }
 
