@@ -230,7 +230,7 @@ fn parameters_that_vanish_are_kept_above_zero() {
     }
 }
 
-/// Where the torque is the largest the least that counts as saliency is a small part of what there is: of a linear machine the tables have its own everywhere.
+/// A small part of the saliency at the largest torque is the least that counts: of a linear machine the tables have its own everywhere.
 #[test]
 fn tables_of_a_linear_machine_have_its_saliency() {
     let tables = IPM.folder(&[]).tables();
