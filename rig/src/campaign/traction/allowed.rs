@@ -24,8 +24,10 @@ impl Drive {
         let current_a = match case.fault.cause {
             // Flux linkage that is there when a device fails cannot leave a machine that is shorted; nothing the gates do is better.
             Cause::Bench(Kind::Device(_)) => most_a.max(FORCED * observed.stored.short_circuit_a),
-            // Nor can that of magnets whose EMF is above the link.
-            _ if seen.trip.is_some_and(|trip| trip.safe != SafeState::GatesOff) => {
+            // Nor can that of magnets which by themselves drive more than the trip level through a short circuit.
+            _ if self.most_rpm().is_some()
+                && seen.trip.is_some_and(|trip| trip.safe != SafeState::GatesOff) =>
+            {
                 most_a.max(FORCED * observed.stored.short_circuit_a)
             }
             _ => most_a,

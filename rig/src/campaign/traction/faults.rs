@@ -115,12 +115,17 @@ fn angles(list: &mut Faults<Cause>) {
 fn supply(list: &mut Faults<Cause>, scale: f64) {
     const LINK: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage];
     const OVER: &[Fault] = &[Fault::DcOvervoltage, Fault::Overcurrent];
-    const UNDER: &[Fault] = &[Fault::DcUndervoltage, Fault::Overcurrent];
     const SWINGS: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage, Fault::Overcurrent];
     let swinging = |amplitude_v, hz| Kind::Supply(SupplyFault::Swinging(scale * amplitude_v, hz));
     list.add("link-lost", Kind::Supply(SupplyFault::Lost), LINK, Some(UNFELT), true);
     list.add("link-over", Kind::Supply(SupplyFault::To(scale * 2_300.0)), OVER, None, true);
-    list.add("link-under", Kind::Supply(SupplyFault::To(scale * 600.0)), UNDER, None, true);
+    list.add(
+        "link-under",
+        Kind::Supply(SupplyFault::To(scale * 600.0)),
+        &[Fault::DcUndervoltage],
+        None,
+        true,
+    );
     list.add("link-swings", swinging(300.0, 40.0), SWINGS, Some(UNFELT), true);
     list.add("link-sways", swinging(150.0, 16.7), &[], Some(BENT), true);
 }

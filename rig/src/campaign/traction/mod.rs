@@ -27,7 +27,7 @@ use crate::plant::{Plant, PlantSettings, SpeedSource, Stator};
 use crate::run::traction::Tasks;
 use crate::run::{self, Interrupts};
 use crate::scenario::System;
-use crate::scenario::traction::{PatternsName, Traction};
+use crate::scenario::traction::{PatternsName, Traction, emf_v};
 use crate::trace::Row;
 use anyhow::Result;
 use core::cell::Cell;
@@ -62,6 +62,8 @@ pub struct Drive {
     /// The machine that it drives.
     pub machine: Machine,
     scale: Scale,
+    /// The largest current of its short circuit without current before, in A.
+    short_circuit_a: f64,
     clock: Clock,
     tables: &'static Tables,
     without: Option<Ablation>,
@@ -84,8 +86,10 @@ impl Drive {
         let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
         let clock = run::clock(Clock::control_hz(tables.ratings.max_switching_hz));
         let scale = Scale::of(&machine);
-        let drive =
-            Self { machine, scale, clock, tables, without, ladder: Ladder::PAPER, carrier_share: 1.0 };
+        let short_circuit_a =
+            Stator::new(&machine.folder, &PlantSettings::default()).peak_on_flux_circle_a(0.0, 0.0);
+        let (ladder, carrier_share) = (Ladder::PAPER, 1.0);
+        let drive = Self { machine, scale, short_circuit_a, clock, tables, without, ladder, carrier_share };
         Settings::new(clock, drive.devices(0)).check(drive.machine.tables).map_err(run::refused)?;
         Ok(drive)
     }
@@ -93,16 +97,12 @@ impl Drive {
     /// The speed up to which a machine may coast whose short circuit begins with a current above the trip level, in r/min: faster, its EMF drives as much through
     /// the diodes; `None` where it may at every speed.
     pub fn most_rpm(&self) -> Option<f64> {
-        let stator = Stator::new(&self.machine.folder, &PlantSettings::default());
-        let most_a = stator.peak_on_flux_circle_a(0.0, 0.0);
-        (most_a > self.machine.folder.parameters.trip_current_a).then(|| self.rectifying_rpm())
+        (self.short_circuit_a > self.machine.folder.parameters.trip_current_a).then(|| self.rectifying_rpm())
     }
 
     /// The speed from which on the EMF between the lines is above the nominal link, in r/min.
     pub(super) fn rectifying_rpm(&self) -> f64 {
-        let ratings = &self.machine.tables.ratings;
-        let wb = f64::from(ratings.magnet_flux_wb * ratings.pole_pairs) * 3.0_f64.sqrt();
-        self.machine.folder.parameters.dc_link_nominal_v / wb * (60.0 / core::f64::consts::TAU)
+        self.machine.folder.parameters.dc_link_nominal_v / emf_v(1.0, &self.machine)
     }
 
     /// The same with the modes of another ladder.

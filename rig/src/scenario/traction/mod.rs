@@ -553,7 +553,7 @@ fn of_rated_rpm(speed_rpm: f64, machine: &Machine) -> f64 {
 }
 
 /// Voltage of the machine without current at a speed in r/min, peak between lines, in V.
-fn emf_v(speed_rpm: f64, machine: &Machine) -> f64 {
+pub(crate) fn emf_v(speed_rpm: f64, machine: &Machine) -> f64 {
     let turns_s = speed_rpm.abs() / 60.0 * f64::from(machine.folder.parameters.pole_pairs);
     3.0_f64.sqrt() * core::f64::consts::TAU * turns_s * f64::from(machine.tables.ratings.magnet_flux_wb)
 }
