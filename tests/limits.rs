@@ -1,6 +1,7 @@
 //! Limits of the protection to the last bit: which value is still allowed, which is the first that is not, and which fault is named where
 //! several limits are broken at once.
 
+use core::f32::consts::TAU;
 use tractive::built_in::traction::BUILT_IN;
 use tractive::cell::Words;
 use tractive::control::{
@@ -252,12 +253,22 @@ fn what_flows_through_the_diodes_to_the_last_bit() {
     let flowing_a = 0.05 * RATINGS.max_current_a;
     let (omega, udc_v) = (1_500.0, 1_500.0);
     // 0.15 rad a period: more than a turn after 42 of them.
-    for current in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]] {
+    // Of two phases at least; what one alone shows is its sensor's.
+    for (current, shorted) in [
+        ([1.0, -1.0, 0.0], Some(42)),
+        ([0.0, 1.0, -1.0], Some(42)),
+        ([-1.0, 0.0, 1.0], Some(42)),
+        ([1.0, -2.0, 1.0], Some(42)),
+        ([30.0, 0.0, 0.0], None),
+        ([0.0, -30.0, 0.0], None),
+        ([0.0, 0.0, 30.0], None),
+    ] {
         let of = |size: f32| {
-            let [a, b, c] = current.map(|part: f32| part * size);
+            let [a, b, c] =
+                current.map(|part: f32| if part.abs() > 1.0 { part * flowing_a } else { part * size });
             shorted_after(Abc { a, b, c }, omega, udc_v)
         };
-        assert_eq!((of(flowing_a), of(flowing_a.next_up())), (None, Some(42)));
+        assert_eq!((of(flowing_a), of(flowing_a.next_up())), (None, shorted), "{current:?}");
     }
     let least_v = RATINGS.trip_dc_under_v;
     for (udc_v, omega) in just(0.5).into_iter().filter(|(udc_v, _)| *udc_v >= least_v) {
@@ -280,20 +291,42 @@ fn an_empty_link_is_no_reason_to_short_a_slow_machine() {
     }
 }
 
-/// A period without current begins the turn anew; a machine that is shorted already is left alone.
+/// Periods without current take back as much of the turn as they last; a machine that is shorted already is left alone.
 #[test]
-fn a_turn_through_the_diodes_is_one_without_a_pause() {
+fn a_pause_of_the_current_takes_back_what_it_lasts() {
     let open =
         |a: f32| OpenGates { currents_a: phases(a), udc_v: 1_500.0, omega: 1_500.0, period_s: PERIOD_S };
     let sound = LegFaults::default();
     let mut watch = DiodeWatch::new();
     let mut step = |a: f32, safe: SafeState| watch.step(safe, &open(a), &sound, RATINGS);
     assert!((0..41).all(|_| step(50.0, SafeState::GatesOff).is_none()));
-    assert_eq!(step(0.0, SafeState::GatesOff), None);
-    assert!((0..41).all(|_| step(50.0, SafeState::GatesOff).is_none()));
+    assert!((0..10).all(|_| step(0.0, SafeState::GatesOff).is_none()));
+    assert!((0..10).all(|_| step(50.0, SafeState::GatesOff).is_none()));
     assert_eq!(step(50.0, SafeState::GatesOff), Some(SafeState::ShortCircuit));
     assert!((0..100).all(|_| step(50.0, SafeState::ShortCircuit).is_none()));
     assert!((0..41).all(|_| step(50.0, SafeState::GatesOff).is_none()));
+}
+
+/// Of a current that is held a sensor which fails hides no more than the zero crossings of the other two, whichever it is and whatever it shows.
+#[test]
+fn a_sensor_that_fails_does_not_hide_a_current_that_stays() {
+    const PERIODS_A_TURN: f32 = 42.0;
+    for failed in 0..3 {
+        for shown_a in [0.0, f32::NAN, 400.0] {
+            let mut watch = DiodeWatch::new();
+            let turns = (1..500).map(|period| period as f32 / PERIODS_A_TURN).find(|turns| {
+                let mut currents =
+                    [0.0, 1.0, 2.0].map(|third: f32| 100.0 * ((turns - third / 3.0) * TAU).cos());
+                currents[failed] = shown_a;
+                let [a, b, c] = currents;
+                let omega = TAU / (PERIODS_A_TURN * PERIOD_S);
+                let open =
+                    OpenGates { currents_a: Abc { a, b, c }, udc_v: 1_500.0, omega, period_s: PERIOD_S };
+                watch.step(SafeState::GatesOff, &open, &LegFaults::default(), RATINGS).is_some()
+            });
+            assert!(turns.is_some_and(|turns| turns < 1.75), "{failed} shows {shown_a} A: {turns:?} turns");
+        }
+    }
 }
 
 /// The number of periods that a watch takes for these currents and this voltage, of a rotor whose angle `turns` or stands, once the voltage

@@ -373,7 +373,7 @@ fn the_safe_state_follows_the_emf() {
     assert_eq!(tractive::protection::safe_state(1300.0, 1000.0, &BUILT_IN.ratings), SafeState::ShortCircuit);
 }
 
-/// Gates off and `current` in phase u, at so much of the rule's speed: the time until the watch asks for another state, in turns.
+/// Gates off and `current` through phases u and w, at so much of the rule's speed: the time until the watch asks for another state, in turns.
 fn watched(current: f32, share: f32, legs: LegFaults) -> Option<(SafeState, f32)> {
     let ratings = &BUILT_IN.ratings;
     let omega = share * 1_500.0 / (3.0_f32.sqrt() * ratings.magnet_flux_wb);

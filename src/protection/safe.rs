@@ -57,11 +57,12 @@ const FLOWING_SHARE: f32 = 0.05;
 /// stay: Jahns and Caliskan, "Uncontrolled generator operation of interior PM synchronous machines following high-speed inverter shutdown",
 /// IEEE Trans. Ind. Appl. 35(6), 1999. Up to `ξ` = 18 that is above half the link, with saturation and hot or cold magnets.
 ///
-/// Where nothing is held, the current is gone within an electrical turn. From half the link on a short circuit brakes little, and so a sensor that
-/// shows a current which is none does no harm: an empty link counts as one at the trip level of its voltage, or it would do so from standstill on.
+/// Where nothing is held, the current is gone within an electrical turn. What flows into a machine by one phase leaves it by another: a current that
+/// one phase alone shows is its sensor's, and a short circuit for it would brake. Of two sensors that are left the zero crossings show none; a turn
+/// less each is taken back by as much as they last. An empty link counts as one at the trip level of its voltage.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DiodeWatch {
-    /// By how much the rotor has turned while current flowed, in electrical rad.
+    /// By how much further the rotor has turned while current flowed than while none did, in electrical rad.
     turned_rad: f32,
 }
 
@@ -82,12 +83,14 @@ impl DiodeWatch {
     ) -> Option<SafeState> {
         let OpenGates { currents_a: Abc { a, b, c }, udc_v, omega, period_s } = *open;
         let least_a = FLOWING_SHARE * ratings.max_current_a;
-        let flows = [a, b, c].iter().any(|current| current.abs() > least_a);
+        let flows = [a, b, c].iter().filter(|current| current.abs() > least_a).count() > 1;
         let (standing_v, least_v) = (standing_v(udc_v, ratings), ratings.trip_dc_under_v);
         let charged_v = if standing_v > least_v { standing_v } else { least_v };
         let held = emf_v(omega, ratings) > GENERATING_SHARE * charged_v;
         let generates = safe == SafeState::GatesOff && flows && held;
-        self.turned_rad = if generates { self.turned_rad + omega.abs() * period_s } else { 0.0 };
+        let turn_rad = omega.abs() * period_s;
+        let turned_rad = self.turned_rad + if generates { turn_rad } else { -turn_rad };
+        self.turned_rad = if turned_rad > 0.0 { turned_rad } else { 0.0 };
         let shorted = legs.in_place_of(SafeState::ShortCircuit, omega, ratings);
         (self.turned_rad > core::f32::consts::TAU && shorted != safe).then_some(shorted)
     }
