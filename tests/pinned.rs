@@ -19,7 +19,7 @@ use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
 use tractive::machine::{Ratings, Tables};
 use tractive::modulation::{CarrierHalf, Ladder, Mode, Schedule, SwitchLimits};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
-use tractive::protection::SafeState;
+use tractive::protection::{Fault, MaskedFaults, SafeState};
 use tractive::time::{Clock, Instant};
 
 /// Control periods of a walk.
@@ -27,6 +27,9 @@ const PERIODS: u32 = 4_000;
 /// Walks of each law; every other one has a damped link, and the last two a machine whose magnets are kept.
 const WALKS: u32 = 10;
 const KEPT: Tables = Tables { ratings: Ratings { min_id_a: -120.0, ..BUILT_IN.ratings }, ..BUILT_IN };
+
+/// The currents of a walk do not follow its voltage.
+const UNEXPLAINED: MaskedFaults = MaskedFaults::of(Fault::VoltageUnexplained);
 
 /// Random numbers, the same on every machine.
 struct Random(u64);
@@ -285,7 +288,8 @@ fn sweep(number: u32, dead_ticks: u32, (ladder, fastest_rpm): (Ladder, f32), out
     let first = SwitchLimits::new(250, dead_ticks, 900.0, &CLOCK).shortest_half_ticks;
     let shared = Shared::new();
     let mut control = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks))
-        .scheduled(Schedule::on(ladder, &CLOCK));
+        .scheduled(Schedule::on(ladder, &CLOCK))
+        .without(UNEXPLAINED);
     let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(first));
     let (walk, shadow) = (Walk::new(100 + number), CarrierHalf::off(first));
     let mut board = Board { walk, now: 0, shadow, report: Report::default() };

@@ -7,7 +7,7 @@ use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, Angle, Dq, six_step_v};
 use tractive::modulation::{CarrierHalf, Mode, SwitchLimits, index_limit};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
-use tractive::protection::{Fault, SafeState, Trip};
+use tractive::protection::{Fault, MaskedFaults, SafeState, Trip};
 use tractive::recorder::{Record, Recorder};
 use tractive::time::{Clock, Instant};
 
@@ -73,7 +73,9 @@ impl<'a> Motor<'a> {
     fn drive(&mut self, settings: Settings, shared: &Shared, end: u32, lost: u32) -> Option<Trip> {
         let first = Instant(settings.devices.shortest_half_ticks);
         let mut pwm = PwmTask::new(&BUILT_IN, settings, first);
-        let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
+        // The currents of this motor do not follow its voltage.
+        let unexplained = MaskedFaults::of(Fault::VoltageUnexplained);
+        let mut control = ControlTask::new(&BUILT_IN, settings, Instant(2_500)).without(unexplained);
         loop {
             let (control_at, pwm_at) = (control.next_call(), pwm.next_call());
             let is_control = control_at.0 < lost && !control_at.reached(pwm_at);

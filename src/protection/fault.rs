@@ -80,11 +80,14 @@ pub enum Fault {
     WindingTemperature,
     /// The devices' junctions are, in °C.
     JunctionTemperature,
+    /// The machine's voltage is far from what its currents, its angle and its map make it, in V·s: the position sensor stands still, counts the wrong
+    /// way or is off; or pole pairs, the order of the phases or the machine are others than the drive was told.
+    VoltageUnexplained,
 }
 
 impl Fault {
     /// All of them, in the order of their codes, which begin at 1.
-    pub const ALL: [Self; 34] = [
+    pub const ALL: [Self; 35] = [
         Self::Overcurrent,
         Self::DcOvervoltage,
         Self::DcUndervoltage,
@@ -119,6 +122,7 @@ impl Fault {
         Self::HeatSinkSensor,
         Self::WindingTemperature,
         Self::JunctionTemperature,
+        Self::VoltageUnexplained,
     ];
 
     /// The fault with this code; `None` for 0 or an unknown number.
@@ -163,6 +167,7 @@ impl Fault {
             Self::HeatSinkSensor => "heat_sink_sensor",
             Self::WindingTemperature => "winding_temperature",
             Self::JunctionTemperature => "junction_temperature",
+            Self::VoltageUnexplained => "voltage_unexplained",
         }
     }
 }

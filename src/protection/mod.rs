@@ -12,6 +12,7 @@ mod legs;
 mod link;
 mod masked_faults;
 mod safe;
+mod unexplained;
 mod words;
 
 pub use checks::{
@@ -24,4 +25,5 @@ pub use legs::LegFaults;
 pub use link::LinkLimits;
 pub use masked_faults::MaskedFaults;
 pub use safe::{DiodeWatch, OpenGates, SafeState, generating, safe_state};
+pub use unexplained::UnexplainedWatch;
 pub use words::{trip_from_words, trip_to_words};

@@ -2,7 +2,7 @@
 //! zeros and a sensor's harmonics to learn, pauses, jumps of torque, faults and their acknowledges.
 
 use super::file::{BASIS, hash, holds};
-use super::{BUILT_IN, Board, CLOCK, Walk};
+use super::{BUILT_IN, Board, CLOCK, UNEXPLAINED, Walk};
 use std::f32::consts::TAU;
 use std::fmt::Write;
 use tractive::cell::Words;
@@ -124,7 +124,8 @@ impl PwmPort for Flawed {
 fn drive(name: &str, seed: u32, settings: Settings, unknown: bool, out: &mut String) {
     let first = settings.devices.shortest_half_ticks;
     let shared = Shared::new();
-    let mut control = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
+    let mut control =
+        ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks)).without(UNEXPLAINED);
     let mut pwm = PwmTask::new(&BUILT_IN, settings, Instant(first));
     let (walk, shadow) = (Walk::new(200 + seed), CarrierHalf::off(first));
     let board = Board { walk, now: 0, shadow, report: Report::default() };

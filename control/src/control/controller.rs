@@ -155,6 +155,10 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
         self.map_error.share()
     }
 
+    fn unexplained_v(&self) -> Dq {
+        self.disturbance.latest()
+    }
+
     fn passed_s(&self, clock: &Clock) -> f32 {
         self.samples as f32 * clock.control_s()
     }

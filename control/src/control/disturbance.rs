@@ -19,6 +19,8 @@ pub struct Observer {
     cosine: Dq,
     sine: Dq,
     follows_sixth: bool,
+    /// The whole estimate at the last boundary, in V.
+    latest: Dq,
 }
 
 /// A boundary, and what was seen there.
@@ -43,7 +45,7 @@ impl Observer {
     /// No disturbance known yet.
     pub const fn new() -> Self {
         const ZERO: Dq = Dq { d: 0.0, q: 0.0 };
-        Self { last_flux: None, mean: ZERO, cosine: ZERO, sine: ZERO, follows_sixth: false }
+        Self { last_flux: None, mean: ZERO, cosine: ZERO, sine: ZERO, follows_sixth: false, latest: ZERO }
     }
 
     /// A mean disturbance, in V, that is known beforehand.
@@ -54,6 +56,12 @@ impl Observer {
     /// The mean disturbance, in V, rotor frame: flux rises by it although nobody asked.
     pub fn mean(&self) -> Dq {
         self.mean
+    }
+
+    /// All of the disturbance that was expected at the last boundary, in V. Of a rotor that seems to stand its mean and its sixth harmonic
+    /// are one.
+    pub fn latest(&self) -> Dq {
+        self.latest
     }
 
     /// The disturbance with the rotor at the angle of a direction, in V.
@@ -91,10 +99,12 @@ impl Observer {
             self.cosine = Dq::default();
             self.sine = Dq::default();
             self.mean = self.mean + (voltage - self.mean) * gain;
+            self.latest = self.mean;
             return;
         }
         let sixth = rotor.sixfold();
-        let error = (voltage - self.at(sixth)) * gain;
+        self.latest = self.at(sixth);
+        let error = (voltage - self.latest) * gain;
         self.mean = self.mean + error;
         // Either part moves by the error: the one that turns with the angle, and the one against it.
         self.cosine = self.cosine + error * (2.0 * sixth.cos);

@@ -4,7 +4,7 @@ use super::speed::SpeedTracker;
 use super::{
     AimInput, Boundary, Committed, Law, ModeLimits, Regulated, RotorSample, Target, VoltageVector, Warmth,
 };
-use crate::frames::Angle;
+use crate::frames::{Angle, Dq};
 use crate::machine::Tables;
 use crate::time::Clock;
 
@@ -84,6 +84,12 @@ pub trait ControlLaw {
     /// of a law that has no idea of it.
     fn map_error(&self) -> f32 {
         0.0
+    }
+
+    /// Mean voltage that the law leaves unexplained, in V, rotor frame: currents, angle and map would have another one; nothing of a law
+    /// that does not look.
+    fn unexplained_v(&self) -> Dq {
+        Dq { d: 0.0, q: 0.0 }
     }
 
     /// Time since the last operating point, in s.

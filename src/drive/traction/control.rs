@@ -21,7 +21,7 @@ use crate::frames::Angle;
 use crate::machine::{Machine, Tables};
 use crate::modulation::{Mode, Reference, Schedule};
 use crate::ports::{ControlPort, Report, Sample, Traction};
-use crate::protection::{DiodeWatch, Fault, FrozenWatch, MaskedFaults, Trip};
+use crate::protection::{DiodeWatch, Fault, FrozenWatch, MaskedFaults, Trip, UnexplainedWatch};
 use crate::recorder::{Record, State};
 use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;
@@ -46,6 +46,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     settings: Settings,
     controller: L,
     watch: FrozenWatch,
+    unexplained: UnexplainedWatch,
     /// Nominal instant of the next call.
     now: Instant,
     /// Instant of the newest carrier boundary that was used.
@@ -110,6 +111,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             controller,
             pulses: Pulses::new(&settings, Schedule::new(&settings.clock)),
             watch: FrozenWatch::new(),
+            unexplained: UnexplainedWatch::new(),
             diodes: DiodeWatch::new(),
             now: first,
             boundary: None,
@@ -269,6 +271,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             );
             let offset = self.zeros.begin(ratings.max_current_a);
             self.check(frozen.or(offset), sample, port);
+            self.check(self.unexplained.check(self.machine.tables()), sample, port);
             self.pulse(input, measured, &slot, shared);
             true
         } else {

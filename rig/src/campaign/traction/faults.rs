@@ -98,8 +98,9 @@ fn two_digits(value: f64) -> f64 {
 
 /// The angle sensor.
 fn angles(list: &mut Faults<Cause>) {
-    const LOST: &[Fault] = &[Fault::AngleLost, Fault::Frozen];
-    const PUSHED: &[Fault] = &[Fault::AngleLost, Fault::Frozen, Fault::Overcurrent];
+    const LOST: &[Fault] = &[Fault::AngleLost, Fault::Frozen, Fault::VoltageUnexplained];
+    const PUSHED: &[Fault] =
+        &[Fault::AngleLost, Fault::Frozen, Fault::VoltageUnexplained, Fault::Overcurrent];
     list.add("angle-frozen", Kind::Angle(AngleFault::Frozen), LOST, None, true);
     list.add("angle-jump", Kind::Angle(AngleFault::Jump(90.0)), LOST, None, true);
     list.add("angle-glitches", Kind::Angle(AngleFault::Glitches(40.0, 50)), LOST, None, true);
@@ -115,17 +116,13 @@ fn angles(list: &mut Faults<Cause>) {
 fn supply(list: &mut Faults<Cause>, scale: f64) {
     const LINK: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage];
     const OVER: &[Fault] = &[Fault::DcOvervoltage, Fault::Overcurrent];
+    // The EMF that the link does not hold any more drives as much current in the same period.
+    const UNDER: &[Fault] = &[Fault::DcUndervoltage, Fault::Overcurrent];
     const SWINGS: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage, Fault::Overcurrent];
     let swinging = |amplitude_v, hz| Kind::Supply(SupplyFault::Swinging(scale * amplitude_v, hz));
     list.add("link-lost", Kind::Supply(SupplyFault::Lost), LINK, Some(UNFELT), true);
     list.add("link-over", Kind::Supply(SupplyFault::To(scale * 2_300.0)), OVER, None, true);
-    list.add(
-        "link-under",
-        Kind::Supply(SupplyFault::To(scale * 600.0)),
-        &[Fault::DcUndervoltage],
-        None,
-        true,
-    );
+    list.add("link-under", Kind::Supply(SupplyFault::To(scale * 600.0)), UNDER, None, true);
     list.add("link-swings", swinging(300.0, 40.0), SWINGS, Some(UNFELT), true);
     list.add("link-sways", swinging(150.0, 16.7), &[], Some(BENT), true);
 }
@@ -135,7 +132,8 @@ fn legs(list: &mut Faults<Cause>) {
     const BLOCKED: &[Fault] = &[Fault::DriverBlocked];
     const STUCK: &[Fault] = &[Fault::LegStuck];
     // With three pulses a turn a boundary comes every 0.6 ms: the phase's current may reach its trip level before one sees the leg.
-    const OPEN: &[Fault] = &[Fault::LegStuck, Fault::Overcurrent];
+    // Without current its leg shows nothing; its phase takes no part in the voltage.
+    const OPEN: &[Fault] = &[Fault::LegStuck, Fault::Overcurrent, Fault::VoltageUnexplained];
     for (gate, name) in (0_u8..).zip(GATES) {
         let first = gate < 2;
         list.add(&format!("{name}-stuck-on"), Kind::Gate(gate, true), BLOCKED, None, first);

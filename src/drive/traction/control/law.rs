@@ -13,7 +13,7 @@ use crate::frames::{Angle, SinCos, six_step_v};
 use crate::machine::Machine;
 use crate::modulation::{Mode, Reference};
 use crate::ports::Sample;
-use crate::protection::{DiodeWatch, FrozenWatch, SafeState, safe_state};
+use crate::protection::{DiodeWatch, FrozenWatch, SafeState, UnexplainedWatch, safe_state};
 use crate::time::Instant;
 
 /// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
@@ -122,6 +122,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
             let there = RotorSample::new(self.gains.without(self.zeros.without(currents_a)), angle, tables);
             self.controller.learn(&boundary, &there, follows(slot.key.mode), &Law { gains, clock, tables });
+            let (unexplained_v, omega) = (self.controller.unexplained_v(), self.controller.omega());
+            self.unexplained.step(unexplained_v, omega, boundary.length_s, tables);
         }
     }
 
@@ -230,6 +232,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.controller.begin_without_torque();
         }
         self.watch = FrozenWatch::new();
+        self.unexplained = UnexplainedWatch::new();
         self.boundary = None;
         self.aimed = None;
         self.steady_v = 0.0;

@@ -1,0 +1,39 @@
+//! Mistakes of wiring and of tables on the first run: each is a named fault, none is driven with.
+
+use rayon::prelude::*;
+use tractive::protection::Fault;
+use tractive_rig::scenario::catalogue;
+use tractive_rig::trace::Recorded;
+
+const MACHINES: [&str; 3] = ["pmasynrm-180kw", "ipm-zs9", "pmsm-48v-1kw"];
+
+/// The fault of a sweep from standstill.
+fn fault_of(machine: &str, mistake: &str) -> Option<Fault> {
+    let chosen = catalogue::of_traction(&format!("sweep --machine {machine} {mistake}")).unwrap();
+    let recording = chosen.drive(&chosen.machine().unwrap()).unwrap();
+    recording.trip().map(|trip| trip.fault)
+}
+
+/// Of these 24 sweeps five went to the highest speed before the voltage was looked at, among them the 48 V machine's with a zero that is 120° off.
+#[test]
+fn a_wrong_zero_a_wrong_direction_and_phases_that_are_exchanged_are_named() {
+    const MISTAKES: [&str; 8] = [
+        "--angle-error 30",
+        "--angle-error -60",
+        "--angle-error 120",
+        "--angle-error 180",
+        "--angle-reversed",
+        "--current-sensors v,u,w",
+        "--current-sensors v,w,u",
+        "--current-sensors=-u,-v,-w",
+    ];
+    const NAMES: [Fault; 2] = [Fault::VoltageUnexplained, Fault::Overcurrent];
+    let runs: Vec<_> =
+        MACHINES.into_iter().flat_map(|machine| MISTAKES.map(|mistake| (machine, mistake))).collect();
+    let found: Vec<_> =
+        runs.par_iter().map(|(machine, mistake)| (machine, mistake, fault_of(machine, mistake))).collect();
+    for (machine, mistake, fault) in found {
+        assert!(fault.is_some_and(|fault| NAMES.contains(&fault)), "{machine} {mistake}: {fault:?}");
+        println!("{machine} {mistake}: {fault:?}");
+    }
+}

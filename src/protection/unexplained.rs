@@ -1,0 +1,128 @@
+//! The watch for a voltage that nothing explains.
+//!
+//! At each boundary the control law compares the flux linkage that currents and angle show with the volt-seconds that acted. What it leaves
+//! unexplained on average is small while the angle is the rotor's: a warm winding, the devices, a map that is off. An angle that stands still
+//! or counts the wrong way while the rotor turns leaves the whole EMF.
+
+use super::{FailedCheck, Fault};
+use crate::frames::Dq;
+use crate::machine::Tables;
+
+/// Shares of the drop of the largest current in the resistance, of the nominal link, and of the EMF of the flux linkage at full torque, which together
+/// may stay unexplained for ever: a winding that is hot, with devices and their dead time; and a map or an angle that is off.
+const DROP_SHARE: f32 = 0.8;
+const LINK_SHARE: f32 = 0.01;
+const EMF_SHARE: f32 = 0.25;
+/// Share of that flux linkage that the voltage beyond these may add up to: a reversal of the torque by a map that is a fifth off adds up to two
+/// fifths at most, less what these take.
+const FLUX_SHARE: f32 = 0.2;
+/// The knee of the weakening tables over the flux linkage at full torque.
+const KNEE_PER_FLUX: f32 = 0.345;
+
+/// Looks for a voltage that nothing explains.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct UnexplainedWatch {
+    /// Volt-seconds beyond what may stay unexplained, in V·s.
+    excess_wb: f32,
+}
+
+impl UnexplainedWatch {
+    /// Nothing seen yet.
+    pub const fn new() -> Self {
+        Self { excess_wb: 0.0 }
+    }
+
+    /// A boundary has passed after a half of so many seconds, with a voltage that is left unexplained, in V, rotor frame, at an electrical speed in
+    /// rad/s.
+    #[inline(always)]
+    pub fn step(&mut self, unexplained_v: Dq, omega: f32, half_s: f32, tables: &Tables) {
+        let ratings = &tables.ratings;
+        let still_v = DROP_SHARE * ratings.stator_resistance_ohm * ratings.max_current_a
+            + LINK_SHARE * ratings.dc_link_nominal_v;
+        let may_be_v = still_v + EMF_SHARE * full_flux_wb(tables) * omega.abs();
+        let excess_wb = self.excess_wb + (unexplained_v.length() - may_be_v) * half_s;
+        // What is not a number is found elsewhere.
+        self.excess_wb = if excess_wb > 0.0 { excess_wb } else { 0.0 };
+    }
+
+    /// The fault, once the volt-seconds are too many.
+    #[inline(always)]
+    pub fn check(&self, tables: &Tables) -> Option<FailedCheck> {
+        let limit_wb = FLUX_SHARE * full_flux_wb(tables);
+        (self.excess_wb > limit_wb).then_some((Fault::VoltageUnexplained, self.excess_wb, limit_wb))
+    }
+}
+
+/// The flux linkage at full torque, in Wb.
+#[inline(always)]
+fn full_flux_wb(tables: &Tables) -> f32 {
+    tables.weakening.flux_knee_wb * (1.0 / KNEE_PER_FLUX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in::traction::BUILT_IN;
+    use crate::built_in::zs9;
+    use crate::control::{flux_linkage, mtpa};
+    use crate::machine::Ratings;
+
+    const HALF_S: f32 = 0.5e-3;
+
+    /// The halves until a voltage of the machine with these tables is a fault, in V at an electrical speed in rad/s; `None` of 2,000.
+    fn found_after(unexplained_v: f32, omega: f32, tables: &Tables) -> Option<u32> {
+        let mut watch = UnexplainedWatch::new();
+        (1..2_000).find(|_| {
+            watch.step(Dq { d: 0.0, q: unexplained_v }, omega, HALF_S, tables);
+            watch.check(tables).is_some()
+        })
+    }
+
+    /// The EMF of a rotor that turns while its angle stands is found within half a turn; a voltage that may stay unexplained never is.
+    #[test]
+    fn an_emf_is_found_and_what_may_be_is_not() {
+        for tables in [&BUILT_IN, &zs9::BUILT_IN] {
+            let Ratings { stator_resistance_ohm, max_current_a, dc_link_nominal_v, magnet_flux_wb, .. } =
+                tables.ratings;
+            let (drop_v, flux_wb) = (stator_resistance_ohm * max_current_a, full_flux_wb(tables));
+            for omega in [0.0, 100.0, -800.0_f32] {
+                let may_be_v = 0.8 * drop_v + 0.01 * dc_link_nominal_v + 0.25 * flux_wb * omega.abs();
+                assert_eq!(found_after(0.999 * may_be_v, omega, tables), None, "{omega} rad/s");
+                // A volt more for so long that it is a fifth of the flux linkage.
+                let halves = found_after(may_be_v + 1.0, omega, tables).unwrap();
+                assert!((halves as f32 * HALF_S / (0.2 * flux_wb) - 1.0).abs() < 0.01, "{halves} halves");
+            }
+            let turning = 500.0;
+            let halves = found_after(magnet_flux_wb * turning, 0.0, tables).unwrap();
+            assert!(halves as f32 * HALF_S * turning < core::f32::consts::PI, "{halves} halves");
+        }
+    }
+
+    /// Volt-seconds of short voltages are forgotten; of one that stays the excess and the limit are told; no number is none.
+    #[test]
+    fn volt_seconds_beyond_it_add_up_and_are_forgotten() {
+        let (limit_wb, mut watch) = (0.2 * full_flux_wb(&BUILT_IN), UnexplainedWatch::new());
+        let mut step = |volts: f32| {
+            watch.step(Dq { d: volts, q: 0.0 }, 0.0, HALF_S, &BUILT_IN);
+            watch.check(&BUILT_IN)
+        };
+        for _ in 0..20 {
+            assert!((0..20).all(|_| step(45.0).is_none()));
+            assert!((0..10).all(|_| step(0.0).is_none()));
+        }
+        assert_eq!(step(f32::NAN), None);
+        let (fault, excess_wb, told_wb) = (0..60).find_map(|_| step(45.0)).unwrap();
+        assert_eq!((fault, told_wb), (Fault::VoltageUnexplained, limit_wb));
+        assert!((1.0..1.05).contains(&(excess_wb / limit_wb)), "{excess_wb} V·s");
+    }
+
+    /// The flux linkage at full torque, as the map has it, within a tenth.
+    #[test]
+    fn the_flux_linkage_is_that_of_full_torque() {
+        for tables in [&BUILT_IN, &zs9::BUILT_IN] {
+            let current = mtpa(tables.ratings.max_torque_nm, tables);
+            let share = full_flux_wb(tables) / flux_linkage(tables, current).length();
+            assert!((0.9..1.1).contains(&share), "{} {share}", tables.name);
+        }
+    }
+}
