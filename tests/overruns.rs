@@ -251,9 +251,9 @@ fn traction(injected: InjectedFault) -> (Option<Trip>, Option<u32>, u32) {
 fn zs9(injected: InjectedFault, carrier_ticks: u32) -> (Option<Trip>, Option<u32>) {
     let settings = dual::Settings::new(CLOCK, carrier_ticks);
     let shared = dual::Shared::new();
-    // What the gates do is not played here.
-    let stuck = MaskedFaults::of(Fault::LegStuck);
-    let mut control = dual::ControlTask::new(&zs9::BUILT_IN, settings);
+    // What the gates and the currents do is not played here.
+    let [stuck, unexplained] = [Fault::LegStuck, Fault::VoltageUnexplained].map(MaskedFaults::of);
+    let mut control = dual::ControlTask::new(&zs9::BUILT_IN, settings).without(unexplained);
     let mut pwm = dual::PwmTask::new(&zs9::BUILT_IN, settings).without(stuck);
     let off = PlayedPeriod::off(settings.half_steps());
     let mut board = Board::new(CarrierHalf::default(), off);

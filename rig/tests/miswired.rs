@@ -37,3 +37,19 @@ fn a_wrong_zero_a_wrong_direction_and_phases_that_are_exchanged_are_named() {
         println!("{machine} {mistake}: {fault:?}");
     }
 }
+
+/// Without the check 14 of these 20 runs ended without a fault.
+#[test]
+fn a_wrong_zero_of_the_nine_switch_inverters_motors_is_named() {
+    const ZEROS_DEG: [u32; 5] = [30, 60, 90, 120, 180];
+    let scenarios = ["zs9-load-step", "zs9-reverse", "zs9-cycle", "zs9-steady"];
+    let runs: Vec<_> =
+        scenarios.into_iter().flat_map(|run| ZEROS_DEG.map(|zero_deg| (run, zero_deg))).collect();
+    runs.par_iter().for_each(|(run, zero_deg)| {
+        let line = format!("{run} --angle-error {zero_deg}");
+        let chosen = catalogue::of_zs9(&line).unwrap();
+        let recording = chosen.drive(&chosen.machine().unwrap()).unwrap();
+        let fault = recording.trip().map(|trip| trip.fault);
+        assert_eq!(fault, Some(Fault::VoltageUnexplained), "{line}");
+    });
+}

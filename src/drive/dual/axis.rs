@@ -8,7 +8,7 @@ use crate::control::{
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::ports::MotorDemand;
-use crate::protection::{self, FailedCheck, Fault, FrozenWatch};
+use crate::protection::{self, FailedCheck, Fault, FrozenWatch, UnexplainedWatch};
 
 /// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.
 pub const TRACKING_RAD_S: f32 = 4000.0;
@@ -28,6 +28,7 @@ pub struct Axis<L> {
     controller: L,
     speed_loop: SpeedLoop,
     watch: FrozenWatch,
+    unexplained: UnexplainedWatch,
     /// Electrical speed behind a filter, in rad/s.
     slow: f32,
     /// Mean voltage of the period that began at the last sample, per volt of link; and the link's voltage there.
@@ -77,6 +78,7 @@ impl<L: ControlLaw> Axis<L> {
             controller,
             speed_loop: SpeedLoop::new(),
             watch: FrozenWatch::new(),
+            unexplained: UnexplainedWatch::new(),
             slow: 0.0,
             acting: None,
             ended: None,
@@ -133,6 +135,7 @@ impl<L: ControlLaw> Axis<L> {
         self.controller.idle();
         self.speed_loop = SpeedLoop::new();
         self.watch = FrozenWatch::new();
+        self.unexplained = UnexplainedWatch::new();
         self.acting = None;
     }
 
@@ -149,6 +152,12 @@ impl<L: ControlLaw> Axis<L> {
         let failed = self.watch.check(measured, self.omega(), period_s, &tables.ratings)?;
         let (turned_rad, limit_rad) = self.watch.turned_rad();
         if self.watch.angle_stands() { Some((lost, turned_rad, limit_rad)) } else { Some(failed) }
+    }
+
+    /// A voltage that nothing explains.
+    #[inline(always)]
+    pub fn check_voltage(&self, tables: &Tables) -> Option<FailedCheck> {
+        self.unexplained.check(tables)
     }
 
     /// One control period; what comes of it goes where it stays.
@@ -203,6 +212,7 @@ impl<L: ControlLaw> Axis<L> {
                 length_s: TURNS as f32 * period_s,
             };
             self.controller.learn(&boundary, &sample, limits.follows, &law);
+            self.unexplained.step(self.controller.unexplained_v(), omega, boundary.length_s, tables);
         }
         let voltage = self.controller.regulate(&sample, &committed, &limits, &law);
         let target = self.controller.target();

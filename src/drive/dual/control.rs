@@ -339,6 +339,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let lower = lower.check_frozen(second, lost_lower, settings, tables);
         self.check(upper, port);
         self.check(lower, port);
+        for motor in 0..2 {
+            self.check(self.axes[motor].check_voltage(self.machine.tables()), port);
+        }
     }
 
     /// Control laws of motors and link, while pulses are made.

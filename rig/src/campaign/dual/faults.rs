@@ -80,6 +80,8 @@ fn sensors(list: &mut Faults<Cause>) {
 fn source(list: &mut Faults<Cause>) {
     const SOURCE: &[Fault] = &[Fault::SourceUndervoltage];
     const HIGH: &[Fault] = &[Fault::CapacitorOvervoltage, Fault::DutyRange];
+    // Without the switch the link is not what capacitors and source say.
+    const OPEN: &[Fault] = &[Fault::CapacitorOvervoltage, Fault::DutyRange, Fault::VoltageUnexplained];
     const CUT: &[Fault] = &[Fault::SourceUndervoltage, Fault::CapacitorOvervoltage, Fault::DutyRange];
     list.add("source-low", Kind::SourceLow, SOURCE, None, true);
     list.add("source-high", Kind::SourceHigh, HIGH, None, true);
@@ -87,7 +89,7 @@ fn source(list: &mut Faults<Cause>) {
     list.add("source-lost", Kind::SourceLost, CUT, Some(UNFELT), true);
     list.add("source-shorted", Kind::SourceShort, SOURCE, None, true);
     list.add("source-swings", Kind::SourceSwings(30.0, 50.0), HIGH, Some(UNFELT), true);
-    list.add("source-switch-open", Kind::SourceSwitchOpen, HIGH, Some(UNFELT), true);
+    list.add("source-switch-open", Kind::SourceSwitchOpen, OPEN, Some(UNFELT), true);
     list.add("capacitors-halved", Kind::CapacitorsHalved, HIGH, Some(UNFELT), true);
     list.add("link-out-of-range", Kind::LinkOutOfRange, &[Fault::DutyRange], None, true);
 }

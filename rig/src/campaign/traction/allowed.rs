@@ -8,7 +8,7 @@ use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
 use crate::inject::traction::Kind;
 use core::f64::consts::TAU;
-use tractive::protection::{Fault, SafeState};
+use tractive::protection::SafeState;
 
 impl Drive {
     pub(super) fn allowed(&self, case: &Case, seen: &Seen, safe_torque_nm: f64) -> Allowed {
@@ -58,12 +58,11 @@ impl Drive {
     }
 
     /// The longest time from a fault's first effect until the gates are safe, in s: three carriers, or, where a fault shows with the
-    /// rotor's angle, half an electrical turn. A voltage is unexplained once its volt-seconds add up: until then nobody may feel it.
+    /// rotor's angle, half an electrical turn.
     fn longest_s(&self, case: &Case, seen: &Seen) -> f64 {
         let carrier_s = seen.carrier_s;
         let carriers_s = 3.0 * carrier_s;
-        let adds_up = seen.trip.is_some_and(|trip| trip.fault == Fault::VoltageUnexplained);
-        if case.fault.needs_rest() || adds_up {
+        if case.fault.needs_rest() {
             return STAGES.end_s;
         }
         match case.fault.cause {
