@@ -1,7 +1,7 @@
 //! The drive's own two tasks on the board in memory.
 
 use super::bridge::Rig;
-use super::ports::{control, converted, make_ready, permitted};
+use super::ports::{UNEXPLAINED, control, converted, make_ready, permitted};
 use crate::bench::control_update;
 use nucleo_g474re::built_in::zs9::BUILT_IN;
 use nucleo_g474re::position::PositionState;
@@ -44,7 +44,7 @@ fn the_drive_pulses_two_turning_motors_through_the_registers() {
     let registers = rig.model.registers;
     let (shared, state) = (Shared::new(), PositionState::new());
     let mut control = control(registers, &state);
-    let mut control_task = ControlTask::new(&BUILT_IN, settings());
+    let mut control_task = ControlTask::new(&BUILT_IN, settings()).without(UNEXPLAINED);
     let mut pwm_task = PwmTask::new(&BUILT_IN, settings());
     make_ready(&registers);
     let mut enabled = false;

@@ -2,7 +2,7 @@
 //! is looked at is how the parts work together.
 
 use super::model::Model;
-use super::ports::{converted, drivers_ready};
+use super::ports::{UNEXPLAINED, converted, drivers_ready};
 use crate::bench::{Bench, control_update};
 use crate::bus::{Bus, Sender};
 use nucleo_g474re::built_in::zs9::BUILT_IN;
@@ -113,7 +113,7 @@ impl Image {
             shared: Shared::new(),
             position,
             control: Control::new(registers, super::ports::zeros(), encoders, position),
-            control_task: ControlTask::new(&BUILT_IN, settings()),
+            control_task: ControlTask::new(&BUILT_IN, settings()).without(UNEXPLAINED),
             pwm_task: PwmTask::new(&BUILT_IN, settings()),
             serve: DualServe::new(registers, bus.can, station, position, Configuration::Good),
             slot: DualSlot::new(),

@@ -20,8 +20,11 @@ use tractive::control::Demand;
 use tractive::frames::{Abc, Angle};
 use tractive::ports::DualDriveCommand;
 use tractive::ports::{ControlPort, GateFeedback, MotorDemand, PwmPort};
-use tractive::protection::SafeState;
+use tractive::protection::{Fault, MaskedFaults, SafeState};
 use tractive::time::Instant;
+
+/// The converters' codes do not follow the voltage of the gates.
+pub const UNEXPLAINED: MaskedFaults = MaskedFaults::of(Fault::VoltageUnexplained);
 
 const NOW: Instant = Instant(0);
 
