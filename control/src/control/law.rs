@@ -86,7 +86,7 @@ pub trait ControlLaw {
         0.0
     }
 
-    /// Mean voltage that the law leaves unexplained, in V, rotor frame: currents, angle and map would have another one; nothing of a law
+    /// Voltage that the law leaves unexplained, in V, rotor frame: currents, angle and map would have another one; nothing of a law
     /// that does not look.
     fn unexplained_v(&self) -> Dq {
         Dq { d: 0.0, q: 0.0 }
