@@ -99,6 +99,13 @@ pub struct Seen {
     pub carrier_s: f64,
 }
 
+impl Seen {
+    /// `true` if this fault is the one that is latched.
+    pub fn names(&self, fault: Fault) -> bool {
+        self.trip.is_some_and(|trip| trip.fault == fault)
+    }
+}
+
 /// The consequences that it may have.
 #[derive(Clone, Debug)]
 pub struct Allowed {
@@ -148,17 +155,11 @@ impl Outcome {
     pub fn new<C>(setting: &Setting, fault: &Named<C>, seen: &Seen, allowed: Allowed) -> Self {
         let Seen { observed, trip, torque_error_nm, tick_s, carrier_s } = seen;
         let time_s = observed.ticks_to_safe().map(|ticks| ticks as f64 * tick_s);
-        let named = trip.map(|trip| trip.fault);
-        // Unexplained volt-seconds take as long to add up as they take: until then the currents are judged.
-        let longest_s = match named {
-            Some(Fault::VoltageUnexplained) => f64::INFINITY,
-            _ => allowed.longest_s,
-        };
         let mut stopped = vec![
             Bounded::new(
                 "ms until the gates are safe",
                 time_s.map_or(f64::NAN, |time_s| time_s * 1e3),
-                longest_s * 1e3,
+                allowed.longest_s * 1e3,
             ),
             Bounded::new("A until the gates are safe", observed.until.current_a, allowed.current_a),
             Bounded::new("A with safe gates", observed.after.current_a, allowed.current_a),
@@ -171,6 +172,7 @@ impl Outcome {
             *torque_error_nm,
             torque_share * allowed.torque_nm + allowed.explained_nm,
         ));
+        let named = trip.map(|trip| trip.fault);
         let (verdict, why) = judge::verdict(&fault.rule, named, &stopped, &went_on);
         let since_ticks = observed.safe.map(|(safe, _)| safe as f64 - observed.from as f64);
         Self {

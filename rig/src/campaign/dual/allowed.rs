@@ -2,7 +2,7 @@
 
 use super::cases::Case;
 use super::faults::Cause;
-use super::{CARRIER_HZ, Drive};
+use super::{CARRIER_HZ, Drive, STAGES};
 use crate::bench::Observed;
 use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
@@ -11,6 +11,7 @@ use crate::inject::zs9::Kind;
 use crate::plant::zs9::ZNetwork;
 use crate::run::CLOCK;
 use crate::zs9::settings;
+use tractive::protection::Fault;
 
 impl Drive {
     pub(super) fn allowed(&self, case: &Case, seen: &Seen) -> Allowed {
@@ -27,7 +28,7 @@ impl Drive {
         let highest_v = f64::from(settings::drive(CLOCK, CARRIER_HZ).limits.capacitor_max_v);
         let uc_v = forced_uc_v(observed).max(highest_v);
         Allowed {
-            longest_s: self.longest_s(case, seen.carrier_s),
+            longest_s: self.longest_s(case, seen),
             current_a,
             // The source is what it is; the capacitors decide.
             udc_v: 2.0 * uc_v,
@@ -51,13 +52,15 @@ impl Drive {
 
     /// The longest time from a fault's first effect until the gates are safe, in s: three carriers, or, where a fault shows with the
     /// rotor's angle, half an electrical turn; a capacitor that is overcharged and a rotor that runs away are found by their levels.
-    fn longest_s(&self, case: &Case, carrier_s: f64) -> f64 {
-        let carriers_s = 3.0 * carrier_s;
+    fn longest_s(&self, case: &Case, seen: &Seen) -> f64 {
+        let carriers_s = 3.0 * seen.carrier_s;
         let pole_pairs = self.machine.folder.parameters.pole_pairs;
         match case.fault.cause {
             Cause::Bench(Kind::Current(motor, ..) | Kind::Angle(motor, _)) => {
                 carriers_s.max(half_turn_s(case.point.speeds_rpm[motor], pole_pairs))
             }
+            // The currents are made all the same, and only the voltage tells, whose volt-seconds have to add up.
+            Cause::Bench(Kind::SourceSwitchOpen) if seen.names(Fault::VoltageUnexplained) => STAGES.end_s,
             Cause::Bench(Kind::Gate(..)) => STUCK_S,
             Cause::Bench(Kind::Control(ControlFault::Stopped)) => carriers_s + STALE_S,
             Cause::Runaway(_) => carriers_s + TRACKING_S,

@@ -8,7 +8,7 @@ use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
 use crate::inject::traction::Kind;
 use core::f64::consts::TAU;
-use tractive::protection::SafeState;
+use tractive::protection::{Fault, SafeState};
 
 impl Drive {
     pub(super) fn allowed(&self, case: &Case, seen: &Seen, safe_torque_nm: f64) -> Allowed {
@@ -73,6 +73,8 @@ impl Drive {
                 let lost_rpm = case.conditions.acceleration_rpm_s.abs() * half_turn_s(speed_rpm, pole_pairs);
                 carriers_s.max(half_turn_s(speed_rpm - lost_rpm, pole_pairs))
             }
+            // Where no current flows only the voltage tells, whose volt-seconds have to add up.
+            Cause::Bench(Kind::Gate(_, false)) if seen.names(Fault::VoltageUnexplained) => STAGES.end_s,
             Cause::Runaway => carriers_s + TRACKING_S,
             Cause::Sensor(..) => {
                 let turn_s =
