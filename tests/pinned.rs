@@ -11,8 +11,8 @@ use std::fmt::Write;
 use tractive::built_in::traction::BUILT_IN;
 use tractive::cell::Words;
 use tractive::control::{
-    AimInput, Boundary, Committed, ControlLaw, Controller, Demand, Gains, Law, LinkDamper, LinkWindow,
-    ModeLimits, PiLaw, Regulated, RotorSample, Warmth,
+    AimInput, Boundary, Committed, ControlLaw, Controller, DeadTime, Demand, Gains, Law, LinkDamper,
+    LinkWindow, ModeLimits, PiLaw, Regulated, RotorSample, Warmth,
 };
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
@@ -21,6 +21,9 @@ use tractive::modulation::{CarrierHalf, Ladder, Mode, Schedule, SwitchLimits};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::{Fault, MaskedFaults, SafeState};
 use tractive::time::{Clock, Instant};
+
+/// That of the 180 kW drive, and what it takes on 1,500 V.
+const DEAD_TIME: DeadTime = DeadTime { voltage_v: 6.75, time_s: 5e-6 };
 
 /// Control periods of a walk.
 const PERIODS: u32 = 4_000;
@@ -145,6 +148,14 @@ fn pin(sum: u64, numbers: &[f32]) -> u64 {
     numbers.iter().fold(sum, |sum, number| hash(sum, &number.to_bits().to_le_bytes()))
 }
 
+/// Temperatures now and then, and what nothing explains in each period.
+fn know(law: &mut impl ControlLaw, period: u32, warmth: Warmth, law_of: &Law) {
+    if period.is_multiple_of(64) {
+        law.warm(warmth, law_of);
+    }
+    law.explain(DEAD_TIME, law_of);
+}
+
 /// The walk of a law: a line each eighth of it, with the hash of all outputs until then.
 fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
     let (clock, mut walk, mut sum) = (Clock::new(25_000_000, 2_500), Walk::new(number), BASIS);
@@ -155,13 +166,11 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
     for period in 0..PERIODS {
         walk.step(&clock);
         let omega = law.track(walk.angle, &clock);
-        let off = Dq { d: 15.0 * walk.random.next(), q: 15.0 * walk.random.next() };
-        let current = law.target().current + off;
+        let current =
+            law.target().current + Dq { d: 15.0 * walk.random.next(), q: 15.0 * walk.random.next() };
         let sample = RotorSample::new(current.unpark(walk.angle.sin_cos()).abc(), walk.angle, tables);
         law.observe(&sample, tables);
-        if period % 64 == 0 {
-            law.warm(walk.warmth, &law_of);
-        }
+        know(&mut law, period, walk.warmth, &law_of);
         if period % 3 == 0 {
             let volt_seconds = (!walk.random.is(0.02)).then(|| walk.random.vector(0.3));
             let boundary = Boundary { volt_seconds, length_s: walk.random.within(1e-4, 1e-3) };

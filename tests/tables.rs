@@ -3,8 +3,7 @@
 
 use std::path::Path;
 use tractive::built_in::traction::BUILT_IN;
-use tractive::control::{Region, VoltageLimit, Warmth, flux_linkage, operating_point, torque_nm};
-use tractive::frames::Dq;
+use tractive::control::{Region, VoltageLimit, operating_point};
 use tractive::machine::Tables;
 use tractive_tablegen::{MachineFolder, SmoothMap, rust_source};
 
@@ -234,21 +233,5 @@ fn the_largest_torque_of_least_current_is_none_that_is_limited() {
                 assert_eq!((point.region, point.torque_nm), (region, sign * most_nm));
             }
         }
-    }
-}
-
-/// The least i_q that tells of the effective flux linkage; below it the magnets alone do.
-#[test]
-fn magnets_scale_torque_from_a_thousandth_of_the_current_on() {
-    let (warmth, largest_a) = (Warmth::new(1.0, -0.125), BUILT_IN.ratings.max_current_a);
-    for (share, told) in [(1e-3, true), (0.999e-3, false)] {
-        let current = Dq { d: -0.5 * largest_a, q: share * largest_a };
-        let flux = flux_linkage(&BUILT_IN, current);
-        let less = Dq { d: 0.125 * BUILT_IN.ratings.magnet_flux_wb, q: 0.0 };
-        let torque = torque_nm(&BUILT_IN, flux - less, current) / torque_nm(&BUILT_IN, flux, current);
-        let wanted = if told { torque } else { 0.875 };
-        let got = warmth.scales(current, flux, &BUILT_IN).torque;
-        assert!((got - wanted).abs() < 1e-4, "{got} at {share}");
-        assert!((torque - 0.875).abs() > 0.01, "they can be told apart");
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use tractive_control::control::{
     AimInput, Committed, ControlLaw, Controller, Demand, Gains, Law, ModeLimits, Regulated, RotorSample,
-    Scales, Warmth, flux_linkage, torque_nm,
+    Warmth,
 };
 use tractive_control::frames::{AlphaBeta, Angle, Dq, six_step_v};
 use tractive_control::machine::Tables;
@@ -81,29 +81,4 @@ fn the_operating_point_keeps_the_voltage_with_a_warm_winding() {
         let over = hot.length() / six_step_v(1_000.0) - 1.0;
         assert_eq!(over < 1e-4, kept, "taken for {ratio} of the rating: {over}");
     }
-}
-
-/// Torque and flux linkage of magnets with an eighth less, at currents of either sign and at none.
-#[test]
-fn scales_are_those_of_the_maps_flux_linkage_with_the_magnets_loss() {
-    let tables = tables();
-    let warmth = Warmth::new(1.0, -0.125);
-    let less = Dq { d: 0.125 * tables.ratings.magnet_flux_wb, q: 0.0 };
-    for current in [
-        Dq { d: -60.0, q: 70.0 },
-        Dq { d: -60.0, q: -70.0 },
-        Dq { d: -20.0, q: 5.0 },
-        Dq { d: -150.0, q: 20.0 },
-        // The least i_q that tells.
-        Dq { d: -60.0, q: 1e-3 * tables.ratings.max_current_a },
-    ] {
-        let flux = flux_linkage(&tables, current);
-        let torque = torque_nm(&tables, flux - less, current) / torque_nm(&tables, flux, current);
-        let Scales { torque: told, flux: told_flux } = warmth.scales(current, flux, &tables);
-        assert!((told - torque).abs() < 1e-4, "{current:?}: torque {told}, {torque}");
-        let size = ((flux - less).length() / flux.length()).max(0.75);
-        assert!((told_flux - size).abs() < 1e-4, "{current:?}: flux linkage {told_flux}, {size}");
-    }
-    let none = warmth.scales(Dq::default(), flux_linkage(&tables, Dq::default()), &tables);
-    assert!((none.torque - 0.875).abs() < 1e-4 && (none.flux - 0.875).abs() < 1e-3, "{none:?}");
 }

@@ -1,6 +1,6 @@
 //! The magnets' temperature, from the flux linkage that the drive has learned: magnets lose flux as they warm.
 //!
-//! What the drive learns is one number, the error of the whole flux linkage. It is the magnets' alone where hardly a current flows; and what is
+//! What the drive tells of it is one number, the error of the flux linkage along itself. It is the magnets' alone where hardly a current flows; and what is
 //! not temperature (a magnet's tolerance, an error of the link's sensor, which looks the same) shows as temperature: 1 % as 10 K.
 
 use super::Load;

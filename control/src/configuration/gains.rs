@@ -15,7 +15,7 @@ impl Gains {
             square_damping,
             observer,
             sixth_turn_rad,
-            resistance_from,
+            resistance_doubt,
             link_damping,
         } = *self;
         within(&[
@@ -24,7 +24,7 @@ impl Gains {
             Bound("gains.square_damping", square_damping, ABOVE_ZERO, 10.0),
             Bound("gains.observer", observer, ABOVE_ZERO, 0.5),
             Bound("gains.sixth_turn_rad", sixth_turn_rad, 0.0, 3.0),
-            Bound("gains.resistance_from", resistance_from, ABOVE_ZERO, 10.0),
+            Bound("gains.resistance_doubt", resistance_doubt, ABOVE_ZERO, 10.0),
             Bound("gains.link_damping", link_damping, 0.0, 10.0),
         ])
     }

@@ -5,9 +5,10 @@
 
 use super::speed::SpeedTracker;
 use super::{
-    Boundary, Committed, ControlLaw, Demand, Law, LinkSwing, LinkWindow, ModeLimits, OperatingPoint, Region,
-    Regulated, RotorSample, Scales, VoltageLimit, VoltageVector, Warmth, current_loop, demagnetisation,
-    demand, disturbance, flux_linkage, flux_path, link_filter, map_error, reference, torque_nm, torque_trim,
+    Boundary, Committed, ControlLaw, DeadTime, Demand, Law, LinkSwing, LinkWindow, ModeLimits,
+    OperatingPoint, Region, Regulated, RotorSample, Scales, VoltageLimit, VoltageVector, Warmth,
+    current_loop, demagnetisation, demand, disturbance, flux_path, link_filter, map_error, reference,
+    torque_nm, torque_trim,
 };
 use crate::frames::{Angle, Dq, six_step_v};
 use crate::machine::Tables;
@@ -19,9 +20,6 @@ const DEPTH_PER_TORQUE: f32 = 0.4;
 
 /// Time constant of the torque that is told, in s: half of telemetry's period.
 const TOLD_S: f32 = 0.005;
-
-/// Least flux linkage that tells of the map's error, over the knee of the weakening tables: 0.07 of what full torque needs.
-const TELLING: f32 = 0.2;
 
 /// The target of the current loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,8 +92,6 @@ pub struct Controller<const RIPPLE: bool = true> {
     target: Target,
     /// Stator resistance over its rating.
     resistance_ratio: f32,
-    /// The magnets' flux linkage over the map's, less 1.
-    magnet_share: f32,
 }
 
 impl Controller {
@@ -127,7 +123,6 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
             flowing_nm: 0.0,
             target: Target::NONE,
             resistance_ratio: 1.0,
-            magnet_share: 0.0,
         }
     }
 }
@@ -167,24 +162,29 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
         &self.target
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn warm(&mut self, warmth: Warmth, law: &Law) {
-        self.resistance_ratio = warmth.resistance_ratio();
-        let (current, tables) = (self.target.current, law.tables);
-        let flux = flux_linkage(tables, current);
-        let from_a = law.gains.resistance_from * tables.ratings.max_current_a;
-        // The voltage of all that the magnets have, at 1 rad/s.
-        let seen = Dq { d: 0.0, q: -tables.ratings.magnet_flux_wb };
-        let whole = map_error::share_of(seen, 1.0, current, flux, from_a);
-        let share = warmth.magnet_share();
-        let new = whole * (share - self.magnet_share);
-        self.magnet_share = share;
-        self.map_error.warm(warmth.scales(current, flux, tables), whole * share, new);
+        let ratio = warmth.resistance_ratio();
+        let known = (ratio - self.resistance_ratio) / law.gains.resistance_doubt;
+        self.resistance_ratio = ratio;
+        self.map_error.warm(warmth.magnet_share(), known);
+    }
+
+    #[inline(always)]
+    fn explain(&mut self, dead: DeadTime, law: &Law) {
+        self.map_error.step(&map_error::Input {
+            current: self.target.current,
+            resistance: self.resistance_ohm(law.tables),
+            resistance_doubt: law.gains.resistance_doubt,
+            dead,
+            tables: law.tables,
+        });
     }
 
     fn idle(&mut self) {
         self.demand = demand::Shaper::new();
         self.disturbance = disturbance::Observer::new();
+        self.map_error.pause();
         self.trim = torque_trim::TorqueTrim::new();
         self.link = link_filter::LinkFilter::new();
         self.path = flux_path::FluxPath::new();
@@ -209,7 +209,10 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
         let sixth = follows == Regulated::Mean && turn_rad < law.gains.sixth_turn_rad;
         let drop_v = self.mean_a(sample) * self.resistance_ohm(law.tables);
         let input = disturbance::Input { boundary, sample, omega, drop_v, sixth };
-        self.disturbance.step(&input, law.gains);
+        if let Some(unexplained) = self.disturbance.step(&input, law.gains) {
+            let length_s = boundary.length_s;
+            self.map_error.see(&map_error::Half { unexplained, omega, length_s });
+        }
     }
 
     fn aim(&mut self, input: &AimInput, law: &Law) {
@@ -270,7 +273,7 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
             modulation_index,
             voltage_limit_v: limits.index_limit * six_step_v(link.usable_v),
         };
-        self.learn_map(&point, link_scale, period_s, law);
+        self.map_error.scaled(link_scale);
     }
 
     #[inline(always)]
@@ -354,24 +357,6 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
         map_nm * self.map_error.scales().torque - iron_nm
     }
 
-    /// Learns the map's error from what the integral part explains at an operating point.
-    #[inline(always)]
-    fn learn_map(&mut self, point: &OperatingPoint, link_scale: f32, period_s: f32, law: &Law) {
-        let ratings = &law.tables.ratings;
-        self.map_error.step(&map_error::Input {
-            disturbance: self.disturbance.mean(),
-            explained: 1.0 - link_scale,
-            current: point.current,
-            flux: point.flux,
-            least_wb: TELLING * law.tables.weakening.flux_knee_wb,
-            omega: self.speed.omega(),
-            period_s,
-            resistance_from: law.gains.resistance_from,
-            largest_a: ratings.max_current_a,
-            fastest: ratings.max_speed_rad_s * ratings.pole_pairs,
-        });
-    }
-
     /// Stator resistance of a phase, in ohm.
     #[inline(always)]
     fn resistance_ohm(&self, tables: &Tables) -> f32 {
@@ -390,9 +375,8 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
     /// error is known, and with it what it will leave unexplained there.
     fn start_flying(&mut self, present: Dq) -> Dq {
         let omega = self.speed.omega();
-        let scaled = omega * self.map_error.caught_scale();
-        self.disturbance.expect(self.target.flux.j() * (omega - scaled));
-        present.j() * scaled
+        self.disturbance.expect(self.map_error.more_wb(self.target.flux).j() * -omega);
+        (present + self.map_error.more_wb(present)).j() * omega
     }
 }
 

@@ -104,9 +104,9 @@ pub struct Gains {
     /// Turn in a carrier half, in rad, up to which the integral part follows six times the stator frequency (what dead time
     /// leaves); 0: never.
     pub sixth_turn_rad: f32,
-    /// Share of the largest current from which an error of the resistance, and what devices take along the current, is told from one of
-    /// the flux linkage, above 0 and up to 10; the larger, the more of either counts as the other.
-    pub resistance_from: f32,
+    /// Likely error of the stator's resistance, as a share of its rating, above 0 and up to 10; the larger, the more of what a voltage leaves unexplained
+    /// along the current counts as that and not as an error of the flux linkage.
+    pub resistance_doubt: f32,
     /// Percent of torque by which a motoring drive follows a percent of swing of its link, so that a line filter in front of it is damped;
     /// 0: none.
     pub link_damping: f32,
@@ -120,7 +120,7 @@ impl Gains {
         square_damping: 0.5,
         observer: 0.02,
         sixth_turn_rad: 1.0,
-        resistance_from: 0.15,
+        resistance_doubt: 0.5,
         link_damping: 0.0,
     };
     /// The same without what would compensate a dead time's harmonics.

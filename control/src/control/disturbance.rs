@@ -77,19 +77,19 @@ impl Observer {
         self.mean + self.cosine * sixth.cos + self.sine * sixth.sin
     }
 
-    /// A boundary has passed.
+    /// A boundary has passed; the voltage of its half that nothing explains, in V, rotor frame, where it is known what acted.
     #[inline(always)]
-    pub(super) fn step(&mut self, input: &Input, gains: &Gains) {
+    pub(super) fn step(&mut self, input: &Input, gains: &Gains) -> Option<Dq> {
         let Input { boundary, sample, omega, .. } = *input;
         let flux = sample.flux.unpark(sample.frame);
         let half_turn = Angle::within_half_turn(0.5 * omega * boundary.length_s).sin_cos();
         let per_length = 1.0 / boundary.length_s;
-        if let (Some(last), Some(volt_seconds)) = (self.last_flux, boundary.volt_seconds) {
-            let middle = sample.frame.turned(half_turn.back());
-            let unexplained = (flux - last - volt_seconds).park(middle) * per_length;
-            self.learn(unexplained + input.drop_v, middle, input.sixth, gains.observer);
-        }
-        self.last_flux = Some(flux);
+        let last = self.last_flux.replace(flux);
+        let (last, volt_seconds) = last.zip(boundary.volt_seconds)?;
+        let middle = sample.frame.turned(half_turn.back());
+        let voltage = (flux - last - volt_seconds).park(middle) * per_length + input.drop_v;
+        self.learn(voltage, middle, input.sixth, gains.observer);
+        Some(voltage)
     }
 
     #[inline(always)]

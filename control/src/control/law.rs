@@ -2,7 +2,8 @@
 
 use super::speed::SpeedTracker;
 use super::{
-    AimInput, Boundary, Committed, Law, ModeLimits, Regulated, RotorSample, Target, VoltageVector, Warmth,
+    AimInput, Boundary, Committed, DeadTime, Law, ModeLimits, Regulated, RotorSample, Target, VoltageVector,
+    Warmth,
 };
 use crate::frames::{Angle, Dq};
 use crate::machine::Tables;
@@ -101,6 +102,10 @@ pub trait ControlLaw {
     /// Takes the machine's warmth into account from the next operating point on; call where there is time, as often as the operating point
     /// changes. A law that knows nothing of temperatures goes on as rated.
     fn warm(&mut self, _warmth: Warmth, _law: &Law) {}
+
+    /// Finds what machine and link differ by from what they are taken for, of the voltage that nothing explains, and its use for the operating point: a part of it; call
+    /// while pulses are made, at most once in a control period, where there is time. A law that has no idea of it does nothing.
+    fn explain(&mut self, _dead: DeadTime, _law: &Law) {}
 
     /// Forgets what it has learnt but for the speed, as the gates are off.
     fn idle(&mut self);

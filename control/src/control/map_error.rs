@@ -1,257 +1,437 @@
-//! The error of the flux map, and its use.
+//! The difference of machine and link from what they are taken for, and its use.
 //!
-//! If the machine's flux linkage is (1 + ε) times the map's, and its resistance, with what dead time and devices take along the current,
-//! ΔR more than it is taken for, then u = −ε jωψ − ΔR i stays unexplained. Least squares for both, with ΔR taken as 0 where there is hardly
-//! a current to tell it from:
+//! If the machine's flux linkage is ψ + Δψ, with ψ the map's, and its resistance ΔR more than it is taken for, then the voltage jωΔψ + ΔR i is needed that nothing
+//! explains. Three unknowns make it up: ε of the whole flux linkage, m of the magnets' along d, and ΔR with what dead time and devices take along the current:
 //!
-//! ε = ((u·i)(jωψ·i) − (u·jωψ)(|i|² + i₀²)) / (|ωψ|² (|i|² + i₀²) − (jωψ·i)²)
+//! Δψ = ε ψ + m, u_d = −ωε ψ_q + ΔR i_d, u_q = ω (ε ψ_d + m) + ΔR i_q
 //!
-//! The estimate is reported, and used whole. As much of it as a link sensor may be off is taken for that: a link that is read too large by ε looks like it, and
-//! all volt-seconds are then those of a link of udc/(1 + ε). What is beyond is the map's, and the operating point takes it into account: such a machine needs for a
-//! torque the current that the map gives for T/(1 + ε), and the voltage that it gives on a link of udc/(1 + ε). What [`super::Warmth`] explains
-//! of it is taken into account whole, for torque and flux linkage each by its own amount, and only the rest is an error.
+//! At one operating point ε and m make any Δψ, and a voltage has two components: three unknowns are not to be told apart there. A Kalman filter begins with what each is
+//! likely to be off by, takes the means of some halves at a time, and remembers what it has seen at other currents and speeds: without a current, which says nothing of
+//! the resistance, all the more of the magnets. It forgets within half a minute of telling, never by itself.
+//!
+//! A link that is read too large by ε looks like a machine of which the flux linkage is larger by it, and for the loop both are the same. The torque tells
+//! them apart: as much of ε as a link sensor may be off is taken for that, and all volt-seconds are then those of a link of udc/(1 + ε); the larger ε is beyond, the less of it can
+//! be the sensor's, and the rest is the machine's. The operating point takes that into account: such a machine needs for a torque the current that the map gives for
+//! T/(1 + ΔT/T), and the voltage that it gives on a link of udc/(1 + Δψ/ψ). What [`super::Warmth`] knows of the magnets is taken into account whole, and only the rest is an error.
 
-use super::Scales;
-use crate::frames::{Dq, limit_magnitude};
+use super::{Scales, flux_linkage, torque_nm};
+use crate::frames::{Dq, limit_magnitude, sqrt};
+use crate::machine::Tables;
+use crate::time::Clock;
 
-/// Speed from which the disturbance tells something of the map, as a share of the largest, over that of the largest current which tells
-/// resistance and flux linkage apart: the more of the one counts as the other, the larger the EMF has to be beside it.
-const FROM: f32 = 0.1;
-/// Bandwidth of the estimate, in rad/s.
-const BANDWIDTH_RAD_S: f32 = 5.0;
-/// Error that is the link sensor's: what it, and where the current is small half as much resistance again, may look like.
+/// Speed from which a voltage tells something of the machine, as a share of the largest.
+const FROM: f32 = 0.015;
+/// Halves are averaged for so long, in s: what ripple and sixth harmonic make of them is nothing over some turns.
+const BLOCK_S: f32 = 0.025;
+/// Standard deviations, before anything is known, of ε, and of m as a share of the magnets' flux linkage.
+const SHARE: f32 = 0.1;
+const MAGNETS: f32 = 0.15;
+/// That of the voltage along a current, beyond the resistance's, as a share of the nominal link: where hardly a current flows, dead time and devices take as much.
+const DROP: f32 = 1e-3;
+/// Share of the largest current below which that falls with the current.
+const SMALL: f32 = 0.05;
+/// Voltage that a mean holds besides, as shares of the nominal link and of the EMF.
+const LINK_NOISE: f32 = 3e-3;
+const EMF_NOISE: f32 = 4e-3;
+/// EMF over what the dead time takes from which it tells of the flux linkage.
+const TELLING: f32 = 3.0;
+/// The magnets' EMF over it from which it tells of them, beside all of the flux linkage.
+const TELLING_OF_MAGNETS: f32 = 6.0;
+/// Part of what the dead time takes that says nothing.
+const UNSAID: f32 = 0.25;
+/// Standard deviations of a voltage that is learnt from: a fault of the inverter or its link has more, and is no error of the machine.
+const LIKELY: f32 = 3.0;
+/// Time of telling in which what was told is forgotten, in s.
+const KNOWN_S: f32 = 30.0;
+/// Error that is the link sensor's: what it may look like.
 const LINK: f32 = 0.03;
 /// Part of that which is left alone: a sensor without an error is used as it is, bit for bit.
-const LEFT_ALONE: f32 = 0.005;
+const LEFT_ALONE: f32 = 0.003;
+/// Part of the magnets' flux linkage that is left alone, as resistance and dead time may look like it.
+const LEFT_TO_MAGNETS: f32 = 0.02;
+/// Share of the largest current by which an operating point is another one.
+const MOVED: f32 = 0.01;
+/// Share of the largest current below which i_q makes no torque that tells.
+const LITTLE: f32 = 1e-3;
 /// Largest correction.
-const MOST: f32 = 0.15;
+const MOST: f32 = 0.25;
 
-/// The disturbance over a time, and what was aimed at.
-pub struct Input {
-    /// Mean, in V.
-    pub disturbance: Dq,
-    /// ε that is not in it, as the volt-seconds have it already.
-    pub explained: f32,
-    /// In A.
-    pub current: Dq,
-    /// Flux linkage, in Wb.
-    pub flux: Dq,
-    /// The least that tells something, in Wb.
-    pub least_wb: f32,
-    /// Electrical angular speed, in rad/s.
-    pub omega: f32,
-    /// The time, in s.
-    pub period_s: f32,
-    /// Current i₀ that tells resistance and flux linkage apart, as a share of the largest.
-    pub resistance_from: f32,
-    /// Largest current, in A.
-    pub largest_a: f32,
-    /// Largest electrical angular speed, in rad/s.
-    pub fastest: f32,
+/// ε, m and ΔR, each over its standard deviation before anything is known; or what a volt says of them.
+type Unknown = [f32; 3];
+
+const NOTHING: Dq = Dq { d: 0.0, q: 0.0 };
+
+/// Sums over some halves.
+#[derive(Clone, Copy, Debug)]
+struct Sums {
+    /// Unexplained volt-seconds, in V·s.
+    voltage: Dq,
+    /// Electrical turn, in rad.
+    turn_rad: f32,
+    /// In s.
+    time_s: f32,
 }
 
+impl Sums {
+    const NONE: Self = Self { voltage: NOTHING, turn_rad: 0.0, time_s: 0.0 };
+}
+
+/// Means over some halves.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    /// Unexplained, in V.
+    voltage: Dq,
+    /// By the map, in Wb, times the electrical angular speed.
+    emf: Dq,
+    /// In A.
+    current: Dq,
+    /// Electrical angular speed, in rad/s.
+    omega: f32,
+    /// In s.
+    time_s: f32,
+}
+
+impl Block {
+    const NONE: Self = Self { voltage: NOTHING, emf: NOTHING, current: NOTHING, omega: 0.0, time_s: 0.0 };
+}
+
+/// The operating point of the newest use: current in A, flux linkage by the map in Wb.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    current: Dq,
+    flux: Dq,
+}
+
+impl Point {
+    const NONE: Self = Self { current: NOTHING, flux: NOTHING };
+}
+
+/// The work of the next call.
+#[derive(Clone, Copy, Debug)]
+enum Next {
+    Rest,
+    Use,
+    AlongD,
+    AlongQ,
+}
+
+/// The use that is made of the errors.
+#[derive(Clone, Copy, Debug)]
+struct Use {
+    /// Torque and flux linkage over those of the map, as far as they are corrected for.
+    scales: Scales,
+    /// ε and m of them, m in Wb.
+    whole: f32,
+    magnets_wb: f32,
+    /// Torque over that of the map, as far as it is known.
+    known_torque: f32,
+    /// Flux linkage, along itself, over that of the map, less 1, as far as it is known.
+    share: f32,
+    link_scale: f32,
+}
+
+/// A carrier half that has passed.
+pub struct Half {
+    /// Voltage that nothing explains: flux linkage rises by it although nobody asked, in V.
+    pub unexplained: Dq,
+    /// Electrical angular speed, in rad/s.
+    pub omega: f32,
+    pub length_s: f32,
+}
+
+/// The inverter's dead time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeadTime {
+    /// Voltage that it takes of a phase where nobody knows the sign of its current, in V.
+    pub voltage_v: f32,
+    /// By how much an edge comes late where nobody makes up for it, in s.
+    pub time_s: f32,
+}
+
+impl DeadTime {
+    /// Of so many ticks in carriers of `carrier_ticks`, on a link of `link_v`.
+    #[inline]
+    pub fn of(ticks: u32, carrier_ticks: u32, link_v: f32, clock: &Clock) -> Self {
+        let (ticks, carrier_ticks) = (ticks as f32, carrier_ticks as f32);
+        Self { voltage_v: link_v * ticks / carrier_ticks, time_s: ticks / clock.ticks_per_s }
+    }
+}
+
+/// Everything that a step works on.
+pub struct Input<'a> {
+    /// Of the operating point, in A.
+    pub current: Dq,
+    /// In Ω, and its likely error as a share of the rating.
+    pub resistance: f32,
+    pub resistance_doubt: f32,
+    pub dead: DeadTime,
+    pub tables: &'a Tables,
+}
+
+/// The errors that are known, and how well.
 #[derive(Clone, Copy, Debug)]
 pub struct MapError {
-    /// Without what temperatures explain.
-    share: f32,
-    /// Of a warm machine, as far as its temperatures are known: what they explain is no error.
-    warm: Scales,
+    mean: Unknown,
+    covariance: [Unknown; 3],
+    sums: Sums,
+    /// Points where the sums began and of the newest use.
+    first: Point,
+    newest: Point,
+    block: Block,
+    next: Next,
+    /// ε that the volt-seconds have already.
     explained: f32,
-    /// Of `share` and `warm`: made where they change, since it is wanted far more often.
-    believed: Scales,
+    /// m that temperatures explain, as a share of the magnets' flux linkage.
+    warm: f32,
+    used: Use,
 }
 
 impl MapError {
     pub const fn new() -> Self {
-        Self { share: 0.0, warm: Scales::NONE, explained: 0.0, believed: Scales::NONE }
+        Self {
+            mean: [0.0; 3],
+            covariance: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            sums: Sums::NONE,
+            first: Point::NONE,
+            newest: Point::NONE,
+            block: Block::NONE,
+            next: Next::Use,
+            explained: 0.0,
+            warm: 0.0,
+            used: Use {
+                scales: Scales::NONE,
+                whole: 0.0,
+                magnets_wb: 0.0,
+                known_torque: 1.0,
+                share: 0.0,
+                link_scale: 1.0,
+            },
+        }
     }
 
-    /// ε, as far as it is known.
+    /// By how much the flux linkage is larger than the map's, along itself, as a share.
     pub fn share(&self) -> f32 {
-        self.share + self.explained
+        self.used.share
     }
 
-    /// 1 + ε, as far as it is believed or known by temperatures: of the flux linkage, and of the torque.
+    /// Torque and flux linkage over those of the map, as far as they are corrected for.
     pub fn scales(&self) -> Scales {
-        self.believed
-    }
-
-    /// Knowledge by temperatures: torque and flux linkage, the ε that a machine so warm shows with the present currents, and the part of it that is
-    /// new, because the temperatures are: what was an error until now is none.
-    pub fn warm(&mut self, warm: Scales, explained: f32, new: f32) {
-        (self.warm, self.explained) = (warm, explained);
-        self.share -= new;
-        self.believe();
+        self.used.scales
     }
 
     /// The link's voltage over what its sensor reads, as far as it is known: 1/(1 + ε), within 3e-5, of what ε may be the sensor's.
     pub fn link_scale(&self) -> f32 {
-        let links = limit_magnitude(self.share, LINK);
-        let error = links - limit_magnitude(links, LEFT_ALONE);
-        1.0 - error + error * error
-    }
-
-    /// 1 + ε without the link sensor's part: for the flux linkage of the magnets in a machine that is caught.
-    pub fn caught_scale(&self) -> f32 {
-        let beyond = self.share() - limit_magnitude(self.share, LINK);
-        if self.believed == Scales::NONE { 1.0 } else { 1.0 + limit_magnitude(beyond, MOST) }
+        self.used.link_scale
     }
 
     /// Torque over that of the map, as far as it is known.
     pub fn known_torque_scale(&self) -> f32 {
-        (1.0 + limit_magnitude(self.share, MOST)) * self.warm.torque
+        self.used.known_torque
     }
 
-    fn believe(&mut self) {
-        let share = self.share;
-        let believed = 1.0 + limit_magnitude(share - limit_magnitude(share, LINK), MOST);
-        self.believed = Scales { torque: believed * self.warm.torque, flux: believed * self.warm.flux };
+    /// Flux linkage, in Wb, that the machine has beyond one by the map, as far as it is corrected for.
+    pub fn more_wb(&self, flux: Dq) -> Dq {
+        let Use { whole, magnets_wb, .. } = self.used;
+        Dq { d: flux.d * whole + magnets_wb, q: flux.q * whole }
     }
 
-    /// A time with a mean disturbance.
+    /// Begins anew with the next half; what is known stays.
+    pub fn pause(&mut self) {
+        (self.sums, self.next) = (Sums::NONE, Next::Use);
+    }
+
+    /// Volt-seconds are those of a link of so many times what is read.
+    #[inline(always)]
+    pub fn scaled(&mut self, link_scale: f32) {
+        self.explained = 1.0 - link_scale;
+    }
+
+    /// Takes a half.
+    #[inline(always)]
+    pub fn see(&mut self, half: &Half) {
+        let Half { unexplained, omega, length_s } = *half;
+        self.sums.voltage = self.sums.voltage + unexplained * length_s;
+        self.sums.turn_rad += omega * length_s;
+        self.sums.time_s += length_s;
+    }
+
+    /// Knowledge by temperatures: what the magnets' flux linkage is more than by the map, as a share, and the new part of the resistance, over its likely error. What was an
+    /// error until now is none.
+    pub fn warm(&mut self, magnets: f32, resistance: f32) {
+        let [_, of_magnets, of_resistance] = &mut self.mean;
+        *of_magnets -= (magnets - self.warm) * (1.0 / MAGNETS);
+        *of_resistance -= resistance;
+        self.warm = magnets;
+    }
+
+    /// A part of what there is to be done, of which each takes one call: use for the present current, and of each block either component. Call where there is time.
+    #[inline(always)]
     pub fn step(&mut self, input: &Input) {
-        let Input {
-            disturbance,
-            current,
-            flux,
-            least_wb,
+        let moved = (input.current - self.newest.current).squared();
+        let little_a = MOVED * input.tables.ratings.max_current_a;
+        if matches!(self.next, Next::Rest) && moved > little_a * little_a {
+            self.next = Next::Use;
+        }
+        if !matches!(self.next, Next::Rest) || self.sums.time_s >= BLOCK_S {
+            self.go_on(input);
+        }
+    }
+
+    #[inline(never)]
+    fn go_on(&mut self, input: &Input) {
+        self.next = match self.next {
+            Next::Rest => {
+                if self.closes_block(input.tables) {
+                    Next::AlongD
+                } else {
+                    Next::Rest
+                }
+            }
+            Next::Use => {
+                self.make_use(input);
+                Next::Rest
+            }
+            Next::AlongD => {
+                let Block { voltage, emf, current, .. } = self.block;
+                let needed = self.needed(-voltage.d, -emf.q, current.d * input.resistance);
+                let row = [-emf.q * self.share_tells(input), 0.0, current.d * self.drop_ohm(input)];
+                self.observe(needed, row, input);
+                Next::AlongQ
+            }
+            Next::AlongQ => {
+                let Block { voltage, emf, current, omega, .. } = self.block;
+                let magnets_v = omega * input.tables.ratings.magnet_flux_wb;
+                let needed =
+                    self.needed(-voltage.q, emf.d, current.q * input.resistance) - magnets_v * self.warm;
+                let tells =
+                    if magnets_v.abs() > TELLING_OF_MAGNETS * input.dead.voltage_v { MAGNETS } else { 0.0 };
+                let row =
+                    [emf.d * self.share_tells(input), magnets_v * tells, current.q * self.drop_ohm(input)];
+                self.observe(needed, row, input);
+                Next::Use
+            }
+        };
+    }
+
+    /// Makes means of the sums and begins anew; `true` if they tell something.
+    fn closes_block(&mut self, tables: &Tables) -> bool {
+        let (sums, first, last) = (self.sums, self.first, self.newest);
+        (self.sums, self.first) = (Sums::NONE, last);
+        let per_s = 1.0 / sums.time_s;
+        let omega = sums.turn_rad * per_s;
+        self.block = Block {
+            voltage: sums.voltage * per_s,
+            // A demand moves along a straight line.
+            emf: (first.flux + last.flux) * (0.5 * omega),
+            current: (first.current + last.current) * 0.5,
             omega,
-            period_s,
-            resistance_from,
-            largest_a,
-            fastest,
-            ..
-        } = *input;
-        // A machine with hardly any flux linkage, as one of reluctance alone with hardly a current, has nothing to tell by either.
-        if omega.abs() < resistance_from * (FROM * fastest) || flux.squared() < least_wb * least_wb {
+            time_s: sums.time_s,
+        };
+        omega.abs() >= FROM * (tables.ratings.max_speed_rad_s * tables.ratings.pole_pairs)
+    }
+
+    /// Voltage that is needed beyond EMF and drop on the link that is read, in V, where on the scaled one so much is.
+    fn needed(&self, voltage_v: f32, emf_v: f32, drop_v: f32) -> f32 {
+        (voltage_v + self.explained * (emf_v + drop_v)) / (1.0 - self.explained)
+    }
+
+    /// Likely voltage along the current, over it.
+    fn drop_ohm(&self, input: &Input) -> f32 {
+        let ratings = &input.tables.ratings;
+        let small_a = SMALL * ratings.max_current_a;
+        let likely_a = sqrt(self.block.current.squared() + small_a * small_a);
+        input.resistance_doubt * ratings.stator_resistance_ohm + DROP * ratings.dc_link_nominal_v / likely_a
+    }
+
+    /// Standard deviation of ε, where the EMF tells of it.
+    fn share_tells(&self, input: &Input) -> f32 {
+        let least_v = TELLING * input.dead.voltage_v;
+        if self.block.emf.squared() > least_v * least_v { SHARE } else { 0.0 }
+    }
+
+    /// A component of the voltage that is needed, in V, with what each unknown makes of it.
+    #[inline(never)]
+    fn observe(&mut self, voltage_v: f32, row: Unknown, input: &Input) {
+        let ratings = &input.tables.ratings;
+        let link_v = LINK_NOISE * ratings.dc_link_nominal_v;
+        let small_a = SMALL * ratings.max_current_a;
+        let unsure = small_a * small_a / (small_a * small_a + self.block.current.squared());
+        let dead_v = input.dead.voltage_v * unsure;
+        let noise = link_v * link_v + dead_v * dead_v + (EMF_NOISE * EMF_NOISE) * self.block.emf.squared();
+        let gain = self.covariance.map(|line| dot(line, row));
+        let variance = dot(gain, row) + noise;
+        let per = 1.0 / variance;
+        let missing = voltage_v - dot(self.mean, row);
+        if !missing.is_finite() {
             return;
         }
-        let seen = share_of(disturbance, omega, current, flux, resistance_from * largest_a);
-        self.share += BANDWIDTH_RAD_S * period_s * (seen + input.explained - self.explained - self.share);
-        self.believe();
-    }
-}
-
-/// ε of a voltage in V that is unexplained at an electrical angular speed in rad/s, a current in A and its flux linkage by the map in Wb, with i₀ in A.
-#[inline(always)]
-pub fn share_of(voltage: Dq, omega: f32, current: Dq, flux: Dq, from_a: f32) -> f32 {
-    let emf = flux.j();
-    let along_emf = voltage.d * emf.d + voltage.q * emf.q;
-    let along_current = voltage.d * current.d + voltage.q * current.q;
-    let both = emf.d * current.d + emf.q * current.q;
-    let squared = current.squared() + from_a * from_a;
-    (along_current * both - along_emf * squared) / (omega * (flux.squared() * squared - both * both))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const CURRENT: Dq = Dq { d: -120.0, q: 160.0 };
-    const FLUX: Dq = Dq { d: -0.4, q: 1.1 };
-
-    /// The estimate after a second with this unexplained share of the flux linkage and this resistance in Ω.
-    fn estimate(share: f32, more_ohm: f32, current: Dq, omega: f32) -> f32 {
-        let mut error = MapError::new();
-        let disturbance = FLUX.j() * (-share * omega) + current * -more_ohm;
-        for _ in 0..2_000 {
-            error.step(&Input {
-                disturbance,
-                explained: 0.0,
-                current,
-                flux: FLUX,
-                least_wb: 0.03,
-                omega,
-                period_s: 1e-3,
-                resistance_from: 0.15,
-                largest_a: 267.0,
-                fastest: 1_500.0,
-            });
-        }
-        error.share()
-    }
-
-    #[test]
-    fn a_resistance_feigns_less_than_half_a_percent() {
-        for omega in [35.0, 300.0, -300.0] {
-            for (share, more_ohm) in [(0.1, 0.0), (-0.1, 0.05), (0.0, 0.05), (0.03, -0.03)] {
-                let told = estimate(share, more_ohm, CURRENT, omega);
-                assert!((told - share).abs() < 5e-3, "{told} for {share} with {more_ohm} Ω at {omega} rad/s");
+        // What the dead time explains says nothing, and what is hardly likely no more than what is.
+        let missing = missing - limit_magnitude(missing, UNSAID * dead_v);
+        let missing = limit_magnitude(missing, LIKELY * sqrt(variance)) * per;
+        let forgotten = self.block.time_s * (0.5 / KNOWN_S);
+        for (number, (line, along)) in self.covariance.iter_mut().zip(gain).enumerate() {
+            for (across, (entry, gain)) in line.iter_mut().zip(gain).enumerate() {
+                let first = if across == number { forgotten } else { 0.0 };
+                *entry = (*entry - along * per * gain) * (1.0 - forgotten) + first;
             }
         }
-    }
-
-    #[test]
-    fn without_flux_linkage_nothing_is_told() {
-        for flux_wb in [0.0, 1e-15, 0.029] {
-            let mut error = MapError::new();
-            error.step(&Input {
-                disturbance: Dq { d: 3.0, q: -2.0 },
-                explained: 0.0,
-                current: Dq { d: 0.0, q: 0.0 },
-                flux: Dq { d: flux_wb, q: 0.0 },
-                least_wb: 0.03,
-                omega: 300.0,
-                period_s: 1e-3,
-                resistance_from: 0.15,
-                largest_a: 267.0,
-                fastest: 1_500.0,
-            });
-            let found = (error.share(), error.link_scale(), error.scales());
-            assert_eq!(found, (0.0, 1.0, Scales::NONE), "{flux_wb} Wb");
+        for (mean, gain) in self.mean.iter_mut().zip(gain) {
+            *mean += gain * missing;
         }
     }
 
-    /// A drive that makes use of the link's scale, in front of a machine with this share of more flux linkage: the estimate after two seconds,
-    /// the scale, and what the map has of it.
-    fn used(share: f32) -> [f32; 3] {
-        let (mut error, omega) = (MapError::new(), 300.0);
-        for _ in 0..2_000 {
-            let scale = error.link_scale();
-            error.step(&Input {
-                disturbance: FLUX.j() * (omega * (1.0 - scale - share)),
-                explained: 1.0 - scale,
-                current: CURRENT,
-                flux: FLUX,
-                least_wb: 0.03,
-                omega,
-                period_s: 1e-3,
-                resistance_from: 0.15,
-                largest_a: 267.0,
-                fastest: 1_500.0,
-            });
+    /// The use of what is known, with a current.
+    fn make_use(&mut self, input: &Input) {
+        let Input { current, tables, .. } = *input;
+        let ratings = &tables.ratings;
+        let flux = flux_linkage(tables, current);
+        self.newest = Point { current, flux };
+        if self.sums.time_s == 0.0 {
+            self.first = self.newest;
         }
-        [error.share(), error.link_scale(), error.scales().torque]
+        // What a weber of the magnets makes of torque and flux linkage, as shares.
+        let per_wb = Scales {
+            torque: if current.q.abs() < LITTLE * ratings.max_current_a {
+                1.0 / ratings.magnet_flux_wb
+            } else {
+                (1.5 * ratings.pole_pairs) * current.q / torque_nm(tables, flux, current)
+            },
+            flux: flux.d / flux.squared(),
+        };
+        let [share, magnets, _] = self.mean;
+        let (share, magnets) = (share * SHARE, magnets * MAGNETS);
+        let links = within(share, LINK);
+        let late = self.block.omega.abs() * input.dead.time_s;
+        let error = links - within(links, LEFT_ALONE + late);
+        let corrected = limit_magnitude(share - links, MOST);
+        let known_wb = (magnets + self.warm) * ratings.magnet_flux_wb;
+        let corrected_wb = known_wb - within(magnets, LEFT_TO_MAGNETS) * ratings.magnet_flux_wb;
+        self.used = Use {
+            scales: Scales {
+                torque: 1.0 + corrected + held(corrected_wb * per_wb.torque),
+                flux: 1.0 + corrected + held(corrected_wb * per_wb.flux),
+            },
+            whole: corrected,
+            magnets_wb: corrected_wb,
+            known_torque: 1.0 + limit_magnitude(share, MOST) + held(known_wb * per_wb.torque),
+            share: share + held(known_wb * per_wb.flux),
+            link_scale: 1.0 - error + error * error,
+        };
     }
+}
 
-    #[test]
-    fn what_a_link_sensor_may_be_off_is_its_own_and_the_rest_the_maps() {
-        for (share, link, map) in [
-            (0.004, 0.0, 0.0),
-            (0.03, 0.025, 0.0),
-            (-0.03, -0.025, 0.0),
-            (0.1, 0.025, 0.07),
-            (-0.1, -0.025, -0.07),
-        ] {
-            let [told, scale, torque] = used(share);
-            assert!((told - share).abs() < 1e-3, "{told} for {share}");
-            assert!((scale * (1.0 + link) - 1.0).abs() < 2e-4, "{scale} for {share}");
-            assert!((torque - 1.0 - map).abs() < 1e-3, "{torque} for {share}");
-        }
-        assert_eq!(used(0.004)[1], 1.0, "a good sensor is used as it is");
-    }
+/// The number within what may be corrected, or 0 for what is none, as of a machine without magnets.
+fn held(share: f32) -> f32 {
+    if share.is_finite() { limit_magnitude(share, MOST) } else { 0.0 }
+}
 
-    #[test]
-    fn without_current_the_flux_linkage_alone_is_asked() {
-        let told = estimate(0.1, 0.0, Dq::default(), 300.0);
-        assert!((told - 0.1).abs() < 1e-3, "{told}");
-    }
+/// The part of an error that is another's, who may be off by so much at most: all of it up to there, none of it from twice as much on.
+fn within(share: f32, most: f32) -> f32 {
+    let less = 2.0 * most - share.abs();
+    if less > 0.0 { limit_magnitude(share, less) } else { 0.0 }
+}
 
-    #[test]
-    fn the_lowest_speed_that_tells_is_its_border() {
-        let border = 0.15 * (FROM * 1_500.0);
-        for (omega, tells) in [(border, true), (-border, true), (0.999 * border, false)] {
-            assert_eq!(estimate(0.1, 0.0, CURRENT, omega) != 0.0, tells, "{omega} rad/s");
-        }
-    }
+fn dot(a: Unknown, b: Unknown) -> f32 {
+    let ([a0, a1, a2], [b0, b1, b2]) = (a, b);
+    a0 * b0 + a1 * b1 + a2 * b2
 }

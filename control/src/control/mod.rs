@@ -42,6 +42,7 @@ pub use disturbance::Observer;
 pub use law::ControlLaw;
 pub use link_damper::{LinkDamper, LinkSwing};
 pub use link_ripple::LinkRipple;
+pub use map_error::DeadTime;
 pub use mtpa::{mtpa, mtpa_passes};
 pub use pi::{MtpaStart, PiLaw};
 pub use reference::{OperatingPoint, Region, VoltageLimit, operating_point};

@@ -1,19 +1,12 @@
 //! The warmth of the machine, as whoever measures its temperatures tells it to the control law.
 
-use super::torque_nm;
-use crate::frames::{Dq, limit_magnitude};
-use crate::machine::Tables;
+use crate::frames::limit_magnitude;
 
 /// Bits of the word that are the magnets' share; the others are the resistance's ratio.
 const SHARE_BITS: u32 = 9;
 /// Steps of 1 of a resistance's ratio and of the magnets' share.
 const PER_RATIO: f32 = 64.0;
 const PER_SHARE: f32 = 1_024.0;
-/// Share of the largest current below which i_q tells of no effective flux linkage.
-const LITTLE: f32 = 1e-3;
-/// The most that magnets can make of torque or flux linkage, as a share.
-const MOST: f32 = 0.25;
-
 /// The resistance of the winding and the flux linkage of the magnets at their temperatures, in half a word of a mailbox.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -58,26 +51,9 @@ impl Warmth {
         let above = 16 - SHARE_BITS;
         f32::from((word << above) as i16 >> above) * (1.0 / PER_SHARE)
     }
-
-    /// Torque and flux linkage at a current, in A, with its flux linkage by the map, in Wb, over those of the map: `1 + Δψ i_q/(ψ_d i_q − ψ_q i_d)` and
-    /// `|ψ + Δψ|/|ψ|`, with the magnets' `Δψ` along d.
-    pub fn scales(self, current: Dq, flux: Dq, tables: &Tables) -> Scales {
-        let ratings = &tables.ratings;
-        let more_wb = ratings.magnet_flux_wb * self.magnet_share();
-        let cross = (1.5 * ratings.pole_pairs) * more_wb * current.q;
-        let torque = if current.q.abs() < LITTLE * ratings.max_current_a {
-            self.magnet_share()
-        } else {
-            cross / torque_nm(tables, flux, current)
-        };
-        let with = Dq { d: flux.d + more_wb, q: flux.q };
-        let beside = with.length() / flux.length() - 1.0;
-        let held = |share: f32| if share.is_finite() { limit_magnitude(share, MOST) } else { 0.0 };
-        Scales { torque: 1.0 + held(torque), flux: 1.0 + held(beside) }
-    }
 }
 
-/// Torque and flux linkage of a warm machine over those of the map.
+/// Torque and flux linkage of a machine over those of the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales {
     /// Torque.

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 const RUNS: [&str; 3] = ["characteristic", "sweep --down", "load-steps"];
 
 /// The flaws, as `--real` has them.
-const FLAWS: [(&str, &str); 19] = [
+const FLAWS: [(&str, &str); 20] = [
     ("none", ""),
     ("dead time, which the drive knows", "--dead-time-us 5"),
     ("steps of the current converters", "--adc-bits 12"),
@@ -34,6 +34,7 @@ const FLAWS: [(&str, &str); 19] = [
     ("jitter of the angle's reading, whose mean it knows", "--angle-jitter-us 1 --angle-late-known"),
     ("drops of IGBTs and diodes", "--device-drop 2,5,1.5,3"),
     ("slots", "--slots 2"),
+    ("magnets 10 K warmer than the map", "--magnets -1"),
     ("resistance", "--rs-error 20"),
     ("iron loss as torque, which the drive knows", "--iron-loss 50 --iron-loss-known"),
     ("elastic shaft", "--shaft 40,0.05"),

@@ -47,6 +47,8 @@ pub struct PlantSettings {
     pub flux_scale: f64,
     /// True stator resistance over the rating.
     pub resistance_scale: f64,
+    /// The magnets' flux linkage over the map's, at 20 °C.
+    pub magnet_scale: f64,
     /// Sixth harmonic of the magnets' voltage over the rotor's angle, as a share of that voltage.
     pub slots_share: f64,
     /// Voltage drops of the inverter's devices; a plant with several motors has its own.
@@ -63,6 +65,7 @@ impl Default for PlantSettings {
             flux_scale: 1.0,
             resistance_scale: 1.0,
             slots_share: 0.0,
+            magnet_scale: 1.0,
             drops: DeviceDrops::NONE,
             iron_share: 0.0,
             shaft: None,

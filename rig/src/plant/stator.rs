@@ -71,7 +71,7 @@ impl Stator {
         Self {
             flux,
             scale: settings.flux_scale,
-            lost_wb: 0.0,
+            lost_wb: (1.0 - settings.magnet_scale) * magnet_wb,
             slots_wb: settings.slots_share / SLOT_ORDER * magnet_wb,
             iron: Iron::of(&machine.parameters, &machine.map, settings.iron_share),
             pole_pairs: f64::from(parameters.pole_pairs),

@@ -2,8 +2,8 @@
 
 use super::{MotorCommand, MotorShare, Settings, TURNS};
 use crate::control::{
-    AimInput, Boundary, Committed, ControlLaw, Demand, Law, Measurements, ModeLimits, Region, Regulated,
-    RotorSample, SpeedInput, SpeedLoop,
+    AimInput, Boundary, Committed, ControlLaw, DeadTime, Demand, Law, Measurements, ModeLimits, Region,
+    Regulated, RotorSample, SpeedInput, SpeedLoop,
 };
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
@@ -225,6 +225,13 @@ impl<L: ControlLaw> Axis<L> {
         // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
         output.power_w =
             begins.map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke()));
+    }
+
+    /// Finds what the machine differs by from its map, of what nothing explains, while pulses are made on a link of `link_v`.
+    pub fn explain(&mut self, link_v: f32, settings: &Settings, tables: &Tables) {
+        let Settings { dead_time_ticks, carrier_ticks, gains, clock, .. } = settings;
+        let dead = DeadTime::of(*dead_time_ticks, *carrier_ticks, link_v, clock);
+        self.controller.explain(dead, &Law { gains, clock, tables });
     }
 
     /// The torque that is asked for, by the operator or by the speed loop.

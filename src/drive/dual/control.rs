@@ -370,6 +370,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let lower =
             AxisInput { measured: m2, demand: d2, speed_torque_nm: l2, applied: a2, link_v, aims: turns[1] };
         second.step(&lower, settings, tables, o2);
+        let learns = if turns[0] { second } else { first };
+        learns.explain(link_v, settings, tables);
         let link = ZSourceInput {
             capacitor_v: sample.capacitor_v,
             inductor_a: sample.inductor_a,

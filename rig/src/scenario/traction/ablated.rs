@@ -5,8 +5,8 @@
 use clap::ValueEnum;
 use serde::Serialize;
 use tractive::control::{
-    AimInput, Boundary, Committed, ControlLaw, Controller, Gains, Law, ModeLimits, Regulated, RotorSample,
-    SpeedTracker, Target, VoltageVector,
+    AimInput, Boundary, Committed, ControlLaw, Controller, DeadTime, Gains, Law, ModeLimits, Regulated,
+    RotorSample, SpeedTracker, Target, VoltageVector,
 };
 use tractive::frames::AlphaBeta;
 use tractive::machine::Tables;
@@ -97,6 +97,10 @@ impl ControlLaw for Ablated {
             let gains = self.gains(law.gains);
             self.controller.learn(boundary, sample, follows, &Law { gains: &gains, ..*law });
         }
+    }
+
+    fn explain(&mut self, dead: DeadTime, law: &Law) {
+        self.controller.explain(dead, law);
     }
 
     fn aim(&mut self, input: &AimInput, law: &Law) {

@@ -154,6 +154,9 @@ pub struct FlawOptions {
     /// Sixth harmonic of the magnets' voltage over the rotor's angle, in percent of that voltage: slots.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
     pub slots: f64,
+    /// By how much the magnets' flux linkage exceeds the map's, in percent of theirs: below 0 hot, above cold.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
+    pub magnets: f64,
     /// Threshold and slope of an IGBT, and of a diode.
     #[arg(long, value_name = "V,MOHM,V,MOHM", allow_negative_numbers = true)]
     pub device_drop: Option<Drops>,
@@ -189,6 +192,7 @@ mod real {
     pub const ANGLE_2F_DEG: f64 = 0.5;
     pub const JITTER_US: f64 = 1.0;
     pub const SLOTS_PERCENT: f64 = 2.0;
+    pub const MAGNETS_PERCENT: f64 = -1.0;
     pub const DROP: [f64; 4] = [2.0, 5.0, 1.5, 3.0];
     pub const SKEW_US: [f64; 3] = [2.0, 1.0, 0.0];
     pub const IRON_PERCENT: f64 = 50.0;
@@ -278,6 +282,7 @@ impl Filled {
                 current_gains: flaws.current_gains.or(Some(Phases(real::GAINS_PERCENT))),
                 angle_jitter_us: or(flaws.angle_jitter_us, real::JITTER_US * times),
                 slots: or(flaws.slots, real::SLOTS_PERCENT),
+                magnets: or(flaws.magnets, real::MAGNETS_PERCENT),
                 device_drop: flaws.device_drop.or(Some(real_drops(machine))),
                 adc_skew_us: flaws.adc_skew_us.or(Some(Times(real::SKEW_US.map(|us| us * times)))),
                 iron_loss: or(flaws.iron_loss, real::IRON_PERCENT),
@@ -312,6 +317,7 @@ impl FlawOptions {
             ("--angle-2f-phase-deg", self.angle_2f_phase_deg, -360.0, 360.0),
             ("--angle-jitter-us", self.angle_jitter_us, 0.0, 1e4),
             ("--slots", self.slots, -100.0, 100.0),
+            ("--magnets", self.magnets, -90.0, 100.0),
         ])?;
         let drops = self.device_drop.unwrap_or_default();
         drops.check(machine)?;
@@ -342,7 +348,8 @@ impl FlawOptions {
     pub fn plant(&self, others: PlantSettings, rotor_kg_m2: f64) -> PlantSettings {
         let shaft = self.shaft.map(|Elastic([hz, damping])| ShaftSettings { hz, damping, rotor_kg_m2 });
         let (slots_share, iron_share) = (self.slots / 100.0, self.iron_loss / 100.0);
-        PlantSettings { slots_share, drops: self.drops(), iron_share, shaft, ..others }
+        let magnet_scale = 1.0 + self.magnets / 100.0;
+        PlantSettings { slots_share, magnet_scale, drops: self.drops(), iron_share, shaft, ..others }
     }
 
     /// The devices' drops.

@@ -7,11 +7,12 @@ use super::super::slot::{Decision, Slot};
 use super::super::{Settings, Shared};
 use super::{ControlTask, Input};
 use crate::control::{
-    AimInput, AngleHarmonics, ControlLaw, Demand, Law, LinkDamper, Measurements, RotorSample, Warmth,
+    AimInput, AngleHarmonics, ControlLaw, DeadTime, Demand, Law, LinkDamper, Measurements, RotorSample,
+    Warmth,
 };
 use crate::frames::{Angle, SinCos, six_step_v};
 use crate::machine::Machine;
-use crate::modulation::{Mode, Reference};
+use crate::modulation::{Mode, Reference, SwitchLimits};
 use crate::ports::Sample;
 use crate::protection::{DiodeWatch, FrozenWatch, SafeState, UnexplainedWatch, safe_state};
 use crate::time::Instant;
@@ -45,6 +46,10 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
             self.delay = self.delayed();
+            let Settings { gains, clock, .. } = &self.settings;
+            let SwitchLimits { dead_time_ticks, shortest_half_ticks, .. } = self.settings.devices;
+            let dead = DeadTime::of(dead_time_ticks, 2 * shortest_half_ticks, input.sample.udc_v, clock);
+            self.controller.explain(dead, &Law { gains, clock, tables });
         }
         if slot.aims || (slot.commands && slot.folds) {
             self.look_ahead(input.sample.udc_v, slot);
