@@ -60,6 +60,7 @@ fn TIMER0() {
     let mut board = qemu::Control;
     if !*IS_SET_UP {
         TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
+        TASK.set_dead_time(DEAD_TIME_TICKS.load(Ordering::Relaxed));
         *IS_SET_UP = true;
     }
     TASK.run(&mut board, &SHARED);

@@ -98,6 +98,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self
     }
 
+    /// Another dead time, in ticks; before the first call.
+    pub fn set_dead_time(&mut self, dead_time_ticks: u32) {
+        self.settings.dead_time_ticks = dead_time_ticks;
+    }
+
     /// Another carrier period than that of the settings it was built with, in ticks; before the first call.
     pub fn set_carrier(&mut self, carrier_ticks: u32) {
         self.settings.carrier_ticks = carrier_ticks;
