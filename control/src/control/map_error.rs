@@ -136,6 +136,7 @@ pub struct Half {
     pub unexplained: Dq,
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
+    /// In s.
     pub length_s: f32,
 }
 
