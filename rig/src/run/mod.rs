@@ -30,6 +30,11 @@ pub const fn clock(control_hz: u32) -> Clock {
     Clock::new(TICKS_HZ, TICKS_HZ / control_hz)
 }
 
+/// A time in µs in whole ticks of these timers.
+pub fn ticks(microseconds: f64) -> u32 {
+    (microseconds * 1e-6 * f64::from(TICKS_HZ)).round() as u32
+}
+
 /// The error of an image that does not start.
 pub(crate) fn refused(refused: Refused) -> anyhow::Error {
     let option = match refused.name.rsplit('.').next() {

@@ -1,8 +1,8 @@
 //! A gate driver fails under torque: the fault, what is refused meanwhile, the acknowledge, and the machine caught again.
 
 use super::line::{self, within};
-use super::of_rated_rpm;
 use super::prelude::*;
+use super::scaled::of_rated_rpm;
 use crate::bench::LinePlan;
 use crate::steps::held;
 use tractive::machine::Ratings;

@@ -2,8 +2,8 @@
 //! control executes while a mode changes and no longer.
 
 use super::prelude::*;
+use super::scaled::{of_rated_rpm, ramp_scale};
 use super::script::Script;
-use super::{of_rated_rpm, ramp_scale};
 
 /// Full torque, at speeds that swing across a border, and an enable that comes and goes.
 #[derive(Clone, Copy, Debug, Args, Serialize)]

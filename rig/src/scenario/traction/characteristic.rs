@@ -1,7 +1,8 @@
 //! Torque accuracy, efficiency and current at the characteristic points: the paper's figure 10.
 
+use super::plan::LEAD_S;
 use super::prelude::*;
-use super::{LEAD_S, of_rated_rpm, scaled_nm};
+use super::scaled::{of_rated_rpm, scaled_nm};
 use crate::analysis::SteadyPoint;
 use crate::{bound, figures, mtpa_methods, spectrum};
 

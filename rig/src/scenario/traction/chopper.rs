@@ -3,7 +3,7 @@
 
 use super::line::{self, within};
 use super::prelude::*;
-use super::{emf_v, of_rated_rpm};
+use super::scaled::{emf_v, of_rated_rpm};
 use crate::bench::LinePlan;
 use tractive::machine::Ratings;
 use tractive::operator::Request;

@@ -2,8 +2,8 @@
 
 use super::load_steps::verdicts;
 use super::prelude::*;
+use super::scaled::{carrier_step_s, of_rated_rpm};
 use super::script::{BEGIN_S, Script};
-use super::{carrier_step_s, of_rated_rpm};
 
 /// 0 → full torque → 0 at `--speed`.
 #[derive(Clone, Copy, Debug, Args, Serialize)]

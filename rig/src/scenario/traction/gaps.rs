@@ -3,7 +3,8 @@
 
 use super::line::{self, within};
 use super::prelude::*;
-use super::{scaled_rpm, udc_v};
+use super::scaled::scaled_rpm;
+use super::setup::udc_v;
 use crate::bench::LinePlan;
 use crate::plant::{DcLinkSettings, LineFilter, Source};
 use tractive::machine::Ratings;

@@ -1,6 +1,9 @@
 //! The identification of a machine, driven: the firmware's own law on the bench, or its image in QEMU.
 
-use super::{Options, PatternsName, Plan, STEP_S, bench, drives, scaled_link, setup, tasks, truth};
+use super::host::{bench, truth};
+use super::plan::STEP_S;
+use super::setup::{setup, tasks};
+use super::{Options, PatternsName, Plan, drives, scaled_link};
 use crate::bench::{Bench, LinePlan};
 use crate::inject::Injection;
 use crate::inject::sensor::CurrentFault;

@@ -4,7 +4,8 @@
 use super::gaps;
 use super::line;
 use super::prelude::*;
-use super::{scaled_rpm, udc_v};
+use super::scaled::scaled_rpm;
+use super::setup::udc_v;
 use crate::bench::LinePlan;
 use crate::options::positive;
 use crate::verdict::bound;

@@ -1,8 +1,9 @@
 //! Steps of the DC link under full load.
 
 use super::prelude::*;
+use super::scaled::scaled_rpm;
 use super::script::{BEGIN_S, Script};
-use super::{scaled_rpm, udc_v};
+use super::setup::udc_v;
 
 /// At several speeds: the link falls by 2/15 of its nominal voltage, comes back, rises by as much, comes back.
 #[derive(Clone, Copy, Debug, Args, Serialize)]

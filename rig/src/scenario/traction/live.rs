@@ -3,8 +3,10 @@
 
 pub use crate::scenario::live::{Command, Start, Turning, Wanted};
 
+use super::host::bench;
 use super::prelude::*;
-use super::{bench, drives, scaled_link, setup, tasks};
+use super::setup::{setup, tasks};
+use super::{drives, scaled_link};
 use crate::bench::{Bench, LinePlan, Simulated};
 use crate::inject::traction::{Kind, SupplyFault};
 use crate::plant::Source;
@@ -65,7 +67,7 @@ impl Live {
         let commander = Box::new(move |_: f64| *asked.lock().unwrap_or_else(PoisonError::into_inner));
         let mut link = scaled_link(machine);
         link.source.reversible = true;
-        link.source.voltage_v = super::udc_v(options, machine);
+        link.source.voltage_v = super::setup::udc_v(options, machine);
         let line = LinePlan { starts_charged: true, ..LinePlan::new(link, commander) };
         let plan = Plan::operated(ROOM_S, vec![(0.0, start.speed_rpm)], line).behind(options.own.line);
         let plan = Plan { judged_step_s: start.step_s, ..plan };

@@ -1,7 +1,8 @@
 //! Load steps at 200 r/min: the paper's figure 8.
 
+use super::plan::LEAD_S;
 use super::prelude::*;
-use super::{LEAD_S, carrier_step_s, of_rated_rpm, scaled_nm, time_scale};
+use super::scaled::{carrier_step_s, of_rated_rpm, scaled_nm, time_scale};
 use crate::analysis::StepResponse;
 use crate::verdict::bound;
 

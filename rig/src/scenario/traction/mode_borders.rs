@@ -1,8 +1,9 @@
 //! Mode borders crossed at constant speed, by torque alone.
 
 use super::prelude::*;
+use super::scaled::scaled_rpm;
 use super::script::{BEGIN_S, Script};
-use super::{scaled_rpm, switches};
+use super::switches;
 
 /// Torque up to the envelope and back, slowly: small steps that the slew limit smooths. At `--speed`, or at two speeds one after the
 /// other.

@@ -2,7 +2,7 @@
 
 use super::line::{self, within};
 use super::prelude::*;
-use super::{emf_v, of_rated_rpm};
+use super::scaled::{emf_v, of_rated_rpm};
 use crate::bench::LinePlan;
 use crate::plant::profile_speed;
 use crate::steps::held;

@@ -1,8 +1,8 @@
 //! Coasting with the gates off, and flying restart.
 
 use super::prelude::*;
+use super::scaled::{ramp_scale, scaled_rpm};
 use super::script::{BEGIN_S, Script};
-use super::{ramp_scale, scaled_rpm};
 use crate::analysis::FlyingStart;
 
 /// At each speed: coast, catch the machine, half of the envelope's torque, release, coast.

@@ -1,7 +1,7 @@
 //! Full power reversed in one step in square wave, released in deep weakening, and applied again.
 
 use super::prelude::*;
-use super::scaled_rpm;
+use super::scaled::scaled_rpm;
 use super::script::{BEGIN_S, Script};
 use crate::spectrum;
 

@@ -1,6 +1,6 @@
 //! A run written down as what happens when.
 
-use super::{LEAD_S, Plan};
+use super::plan::{LEAD_S, Plan};
 use crate::steps::held;
 use tractive::control::Demand;
 

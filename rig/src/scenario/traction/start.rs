@@ -3,7 +3,7 @@
 
 use super::line::{self, within};
 use super::prelude::*;
-use super::udc_v;
+use super::setup::udc_v;
 use crate::bench::{Encoder, LinePlan};
 use crate::options::number;
 use crate::plant::{DcLinkSettings, Source, SpeedSource};

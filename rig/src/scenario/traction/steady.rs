@@ -1,8 +1,9 @@
 //! One operating point in steady state: distortion and torque ripple beside what the pulses allow.
 
+use super::TractionOptions;
 use super::prelude::*;
+use super::scaled::{carrier_step_s, scaled_nm, scaled_rpm};
 use super::script::Script;
-use super::{TractionOptions, carrier_step_s, scaled_nm, scaled_rpm};
 use crate::distortion::{self, Distortion};
 use crate::options::On;
 use crate::{bound, scenario, spectrum};

@@ -1,7 +1,9 @@
 //! Full torque from standstill through every mode: the paper's figure 9.
 
+use super::plan::LEAD_S;
 use super::prelude::*;
-use super::{LEAD_S, of_rated_rpm, switches};
+use super::scaled::of_rated_rpm;
+use super::switches;
 use crate::options::On;
 use crate::pictures::chai::runs::change;
 use crate::{scenario, spectrum};

@@ -3,7 +3,7 @@
 
 use super::line;
 use super::prelude::*;
-use super::{of_rated_rpm, ramp_scale};
+use super::scaled::{of_rated_rpm, ramp_scale};
 use crate::bench::LinePlan;
 use crate::inject::Injection;
 use crate::inject::sensor::CurrentFault;

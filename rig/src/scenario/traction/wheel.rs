@@ -1,8 +1,8 @@
 //! A wheel that loses its grip for a while, motoring and braking: torque is reduced and comes back, and no fault.
 
 use super::line;
-use super::of_rated_rpm;
 use super::prelude::*;
+use super::scaled::of_rated_rpm;
 use crate::bench::LinePlan;
 use crate::options::positive;
 use crate::plant::{SpeedSource, Wheel as Rail};

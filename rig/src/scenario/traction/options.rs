@@ -1,0 +1,218 @@
+//! Options of the drive's runs.
+
+use super::ablated::Part;
+use super::flaws::{Beside, Filled, FlawOptions};
+use crate::bench::Wiring;
+use crate::machine::Machine;
+use crate::options::{finite, not_negative};
+use crate::plant::LineFilter;
+use crate::run::ticks;
+use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
+use tractive::control::MtpaStart;
+use tractive::modulation::{FREE_CARRIER_SHARE, Ladder};
+use tractive_tablegen::Patterns;
+
+/// The point whose inductances the first pass of MTPA takes under `--law pi`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StartName {
+    /// That of the operating point before
+    Previous,
+    /// No current, as we read the paper
+    Zero,
+}
+
+impl StartName {
+    /// As the law takes it.
+    pub(super) const fn of(self) -> MtpaStart {
+        match self {
+            Self::Previous => MtpaStart::Previous,
+            Self::Zero => MtpaStart::Zero,
+        }
+    }
+}
+
+/// The pulse patterns that the drive uses above the free carrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PatternsName {
+    /// The paper's modes
+    Paper,
+    /// Optimised patterns of 15 to 3 pulses
+    Optimal,
+}
+
+impl From<Patterns> for PatternsName {
+    fn from(patterns: Patterns) -> Self {
+        match patterns {
+            Patterns::Paper => Self::Paper,
+            Patterns::Optimal => Self::Optimal,
+        }
+    }
+}
+
+impl PatternsName {
+    /// The patterns of a run: those that its options name, else the machine's.
+    pub fn of(options: &TractionOptions, machine: &Machine) -> Self {
+        options.patterns.unwrap_or_else(|| machine.folder.parameters.patterns.into())
+    }
+
+    /// As the modulator's schedule takes them.
+    pub(crate) const fn ladder(self) -> Ladder {
+        match self {
+            Self::Paper => Ladder::PAPER,
+            Self::Optimal => Ladder::OPTIMAL,
+        }
+    }
+
+    /// Highest frequency of the free carrier, as a share of the switches'.
+    pub(crate) const fn free_carrier_share(self) -> f32 {
+        match self {
+            Self::Paper => 1.0,
+            Self::Optimal => FREE_CARRIER_SHARE,
+        }
+    }
+
+    /// As on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Optimal => "optimal",
+        }
+    }
+}
+
+/// Options of all its scenarios.
+#[derive(Clone, Debug, Args, Serialize)]
+pub struct TractionOptions {
+    /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
+    #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
+    pub mtpa_start: StartName,
+    /// The pulse patterns above the free carrier; without it those that machine.toml names, else the paper's.
+    #[arg(long, value_enum)]
+    pub patterns: Option<PatternsName>,
+    /// A part of the project's own law to take away, to see what it buys; on the host.
+    #[arg(long, value_enum, value_name = "PART")]
+    pub ablate: Option<Part>,
+    /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
+    #[arg(long)]
+    pub uncompensated: bool,
+    /// Rate of the control interrupt, in Hz; without it 10,000, or 20,000 for a machine whose devices switch faster than 10 kHz.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1_000..=100_000))]
+    pub control_hz: Option<u32>,
+    /// Line filter between a stiff source and the link: choke, link capacitor and the resistance of both, written L_MH,C_MF,R_MOHM;
+    /// without it the link itself is stiff.
+    #[arg(long, value_name = "L_MH,C_MF,R_MOHM", allow_negative_numbers = true)]
+    pub line: Option<LineFilter>,
+    /// Drives behind that line filter: the same ones with the same demand, each further one's wheels larger by a percent, so that its speed is lower.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4), value_name = "NUMBER")]
+    pub drives: u32,
+    /// Error of the angle sensor that goes once with the electrical angle, amplitude in electrical degrees.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
+    pub angle_1f_deg: f64,
+    /// The same that goes twice with it.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
+    pub angle_2f_deg: f64,
+    /// Age of the angle when it is read, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
+    pub angle_late_us: f64,
+    /// Lines of the position encoder in a turn of the shaft, four counts each; without it the angle has no steps.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "LINES")]
+    pub encoder_lines: Option<u32>,
+    /// Time constant of the current sensors, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
+    pub current_filter_us: f64,
+    /// The drive knows of --angle-late-us and of the mean of --angle-jitter-us, as by its power stage's key, and makes up for them.
+    #[arg(long)]
+    pub angle_late_known: bool,
+    /// The drive knows of --current-filter-us and of the mean of --adc-skew-us, as by its power stage's key, and makes up for them.
+    #[arg(long)]
+    pub current_filter_known: bool,
+    /// The drive knows of --iron-loss, as by its machine's key, and makes up for it, up to 100 %; --law pi does not.
+    #[arg(long)]
+    pub iron_loss_known: bool,
+    /// The true machine, where it is not the one that control knows: a folder of tables/, or the path of any machine folder.
+    #[arg(long, value_name = "DIR")]
+    pub plant: Option<String>,
+    /// By how much currents are read larger than they are, in percent.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
+    pub current_gain: f64,
+    /// By how much the DC link is read larger than it is, in percent.
+    #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
+    pub udc_gain: f64,
+    /// The phase that each of the three current sensors reads, with - where its leads are exchanged.
+    #[arg(long, default_value_t, allow_hyphen_values = true, value_name = "U,V,W")]
+    pub current_sensors: Wiring,
+    /// The angle sensor counts the wrong way.
+    #[arg(long)]
+    pub angle_reversed: bool,
+    /// Torque of friction of a free rotor against either direction, in N·m.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "NM")]
+    pub friction: f64,
+    /// By how much the PWM timer starts later, in µs.
+    #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
+    pub pwm_delay_us: f64,
+    /// Further flaws.
+    #[serde(flatten)]
+    #[command(flatten)]
+    pub flaws: FlawOptions,
+}
+
+impl TractionOptions {
+    /// Age of the angle that the drive is told, in s.
+    pub(super) fn known_late_s(&self) -> f32 {
+        let mean_us = self.angle_late_us - 0.5 * self.flaws.angle_jitter_us;
+        if self.angle_late_known { (1e-6 * mean_us) as f32 } else { 0.0 }
+    }
+
+    /// Delay of the currents that the drive is told, in ticks: the sensors' time constant, and by how much all phases together are sampled early.
+    pub(super) fn known_filter_ticks(&self) -> u32 {
+        if self.current_filter_known { ticks(self.current_filter_us + self.flaws.mean_skew_us()) } else { 0 }
+    }
+
+    /// Share of the iron loss that the drive is told, in thousandths.
+    pub(super) fn known_iron_permille(&self, machine: &Machine) -> u32 {
+        let known = if self.iron_loss_known {
+            self.flaws.iron_loss / 100.0
+        } else {
+            machine.folder.parameters.iron_loss_share
+        };
+        (1e3 * known).round() as u32
+    }
+
+    /// Mean threshold and slope of the devices that the drive is told, in mV and hundredths of a mΩ.
+    pub(super) fn known_drops(&self) -> (u32, u32) {
+        let drops = self.flaws.drops();
+        let steps = |igbt: f64, diode: f64, per: f64| (0.5 * per * (igbt + diode)).round() as u32;
+        let known = (steps(drops.igbt_v, drops.diode_v, 1e3), steps(drops.igbt_ohm, drops.diode_ohm, 1e5));
+        if self.flaws.device_drop_known { known } else { (0, 0) }
+    }
+}
+
+/// Options of a run.
+pub type Options = crate::options::Options<TractionOptions>;
+
+/// The options with everything that `--real` stands for.
+pub(super) fn filled(options: &Options, machine: &Machine) -> Options {
+    let own = &options.own;
+    if !own.flaws.real {
+        return options.clone();
+    }
+    let TractionOptions { udc_gain, current_filter_us, angle_1f_deg, angle_2f_deg, .. } = *own;
+    let beside = Beside { udc_gain, current_filter_us, angle_deg: [angle_1f_deg, angle_2f_deg] };
+    let Filled { run, beside, flaws } = Filled::of(&options.run, beside, &own.flaws, machine);
+    let Beside { udc_gain, current_filter_us, angle_deg: [angle_1f_deg, angle_2f_deg] } = beside;
+    let own = TractionOptions {
+        udc_gain,
+        current_filter_us,
+        current_filter_known: true,
+        angle_late_known: true,
+        iron_loss_known: true,
+        angle_1f_deg,
+        angle_2f_deg,
+        flaws,
+        ..own.clone()
+    };
+    Options { run, own }
+}
