@@ -9,7 +9,7 @@ use tractive_tablegen::{InputError, MachineFolder, Patterns, rust_source};
 #[allow(dead_code, reason = "the image's")]
 #[path = "src/dead_time.rs"]
 mod dead_time;
-#[path = "build/power_stage.rs"]
+#[path = "build/power_stage/mod.rs"]
 mod power_stage;
 #[path = "src/rates.rs"]
 mod rates;

@@ -1,6 +1,6 @@
 //! The refusals of the build script: each key of a power stage by its name and line, and each machine that the stage does not suit.
 
-#[path = "../build/power_stage.rs"]
+#[path = "../build/power_stage/mod.rs"]
 mod power_stage;
 
 use nucleo_g474re::built_in::{traction, zs9};

@@ -5,7 +5,7 @@
 
 #[path = "../../../tablegen/tests/common/change.rs"]
 mod change;
-#[path = "../build/power_stage.rs"]
+#[path = "../build/power_stage/mod.rs"]
 mod power_stage;
 
 use change::{change, changed};
