@@ -126,7 +126,7 @@ impl Walk {
                 braking_full_v: 1_600.0,
                 braking_none_v: 1_900.0,
             });
-            self.warmth = Warmth::new(random.within(0.8, 1.5), random.within(-0.2, 0.05));
+            self.warmth = Warmth::new(random.within(0.8, 1.5));
         }
         self.rpm += (self.rpm_wanted - self.rpm) * 0.01;
         self.udc_v = (self.udc_v + 5.0 * random.next()).clamp(900.0, 2_000.0);
@@ -151,7 +151,7 @@ fn pin(sum: u64, numbers: &[f32]) -> u64 {
 /// Temperatures now and then, and what nothing explains in each period.
 fn know(law: &mut impl ControlLaw, period: u32, warmth: Warmth, law_of: &Law) {
     if period.is_multiple_of(64) {
-        law.warm(warmth, law_of);
+        law.warm(warmth);
     }
     law.explain(DEAD_TIME, law_of);
 }

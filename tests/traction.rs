@@ -224,7 +224,7 @@ fn the_flight_recorder_knows_whether_control_asked_for_pulses() {
 fn a_machine_whose_temperatures_are_no_longer_known_is_as_rated() {
     const WARM: core::ops::Range<u32> = 4 * SETTLED..5 * SETTLED;
     let warm = |at: u32, _: &mut Sample, command: &mut DriveCommand| {
-        command.warmth = if WARM.contains(&at) { Warmth::new(1.4, -0.15) } else { Warmth::NONE };
+        command.warmth = if WARM.contains(&at) { Warmth::new(1.4) } else { Warmth::NONE };
     };
     let cold = |_: u32, _: &mut Sample, _: &mut DriveCommand| {};
     let current = |hook: &dyn Fn(u32, &mut Sample, &mut DriveCommand), end| {
@@ -232,7 +232,7 @@ fn a_machine_whose_temperatures_are_no_longer_known_is_as_rated() {
         assert_eq!(motor.runs(settings(900.0), end), None);
         Dq { d: motor.report.id_a, q: motor.report.iq_a }
     };
-    // By how much a warm machine's reference is another one than a cold machine's: hardly, as what temperatures say of the magnets was learnt of them before.
+    // By how much a warm machine's reference is another one than a cold machine's: hardly, as its voltage alone is another one.
     let apart = |end| (current(&warm, end) - current(&cold, end)).length();
     let [before, warm, after] = [WARM.start, WARM.start + SETTLED / 8, WARM.end + 2 * SETTLED].map(apart);
     assert!(before == 0.0 && warm > 1e-3 && after < 1e-3, "{before} {warm} {after}");

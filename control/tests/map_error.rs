@@ -35,6 +35,8 @@ struct Run {
     off: Off,
     warmth: Warmth,
     dead: DeadTime,
+    /// Voltage along q that is not the machine's, in V.
+    fault_v: f32,
     turned: f64,
     period: u32,
     last: Option<AlphaBeta>,
@@ -58,7 +60,19 @@ impl Run {
         let tables = MachineFolder::read(&folder).unwrap().tables();
         let clock = Clock::new(25_000_000, 2_500);
         let (law, warmth, dead) = (Controller::new(), Warmth::NONE, DeadTime { voltage_v: 0.0, time_s: 0.0 });
-        Self { law, tables, clock, off, warmth, dead, turned: 0.0, period: 0, last: None, link_scale: 1.0 }
+        Self {
+            law,
+            tables,
+            clock,
+            off,
+            warmth,
+            dead,
+            fault_v: 0.0,
+            turned: 0.0,
+            period: 0,
+            last: None,
+            link_scale: 1.0,
+        }
     }
 
     /// So many seconds at a speed in rad/s with a torque in N·m asked for; a carrier half is five control periods.
@@ -78,7 +92,8 @@ impl Run {
                 let half_way = Angle::from_radians(omega * -0.25e-3).sin_cos();
                 let ohm = self.tables.ratings.stator_resistance_ohm + self.off.ohm;
                 let drop = current.unpark(sample.frame.turned(half_way)) * (ohm * 0.5e-3);
-                let acted = self.last.map(|last| (there - last + drop) * self.link_scale);
+                let fault = Dq { d: 0.0, q: self.fault_v * 0.5e-3 }.unpark(sample.frame.turned(half_way));
+                let acted = self.last.map(|last| (there - last + drop + fault) * self.link_scale);
                 self.last = Some(there);
                 let boundary = Boundary { volt_seconds: acted, length_s: 0.5e-3 };
                 self.law.learn(&boundary, &sample, Regulated::Mean, &constants);
@@ -96,7 +111,7 @@ impl Run {
                 self.link_scale = self.law.link_scale();
             } else {
                 if self.warmth != Warmth::NONE {
-                    self.law.warm(self.warmth, &constants);
+                    self.law.warm(self.warmth);
                 }
                 self.law.explain(self.dead, &constants);
             }
@@ -215,7 +230,8 @@ fn what_a_link_sensor_may_be_off_is_its_own_and_far_beyond_the_maps() {
         assert!((scale - 1.0).abs() < 3e-3, "{share}: link {}", run.law.link_scale());
         let made = run.torque_nm() / 900.0 / (1.0 + share);
         assert!((made * (1.0 + torque) - 1.0).abs() < 6e-3, "{made} for {share}");
-        let told = run.law.flowing_nm() / run.torque_nm() - 1.0;
+        // What is told believes the same.
+        let told = run.law.flowing_nm() / run.torque_nm() * (1.0 + share) / (1.0 + torque) - 1.0;
         assert!(told.abs() < 6e-3, "{told} for {share}");
     }
 }
@@ -242,20 +258,70 @@ fn what_a_dead_time_may_look_like_is_left_alone() {
     assert!(with == 1.0 && (without - 0.99).abs() < 1e-3, "{with}, {without}");
 }
 
-/// Temperatures say what the magnets have: torque follows at once, and what was an error is none.
+/// A winding that is as warm as is told is no error, from the start or while it drives.
 #[test]
-fn what_temperatures_explain_is_no_error() {
-    let mut run = Run::new(Off { wb: -0.08, ..AS_RATED });
-    let magnets = -0.08 / run.tables.ratings.magnet_flux_wb;
-    run.warmth = Warmth::new(1.0, magnets);
-    run.drive(500.0, 0.0, 0.1);
-    run.drive(500.0, 900.0, 0.1);
+fn a_resistance_that_is_told_is_no_error() {
+    let more = |run: &Run, ratio: f32| (ratio - 1.0) * run.tables.ratings.stator_resistance_ohm;
+    for ratios in [[1.4, 1.4], [1.0, 1.4], [1.4, 0.9]] {
+        let mut run = Run::new(AS_RATED);
+        for (ratio, omega) in ratios.into_iter().zip([84.0, 42.0]) {
+            run.warmth = Warmth::new(ratio);
+            run.off.ohm = more(&run, run.warmth.resistance_ratio());
+            run.drive(omega, 900.0, 2.0);
+            let told = run.told_off();
+            println!("{ratio} of the resistance: told {told:.5} off, map {:.5}", run.law.map_error());
+            assert!(told.abs() < 2e-3 && run.law.map_error().abs() < 5e-3, "{ratio}: {told}");
+            assert_eq!(run.law.link_scale(), 1.0);
+        }
+    }
+}
+
+/// Errors that a fast rotor has shown stay known where the dead time takes much of the EMF, with a current and without.
+#[test]
+fn what_is_known_stays_where_a_dead_time_hides_it() {
+    for (wb, omega) in [(-0.08, 60.0), (-0.08, 30.0), (0.05, 60.0)] {
+        let mut run = Run::new(Off { wb, ..AS_RATED });
+        run.dead = DeadTime { voltage_v: 6.75, time_s: 5e-6 };
+        for torque_nm in [0.0, 300.0, 900.0] {
+            run.drive(500.0, torque_nm, 0.3);
+        }
+        let known = run.law.map_error();
+        run.drive(omega, 0.0, 0.5);
+        run.drive(omega, 900.0, 2.0);
+        let off = run.torque_nm() / 900.0 - 1.0;
+        println!("{wb} Wb, {omega} rad/s: {off:.4}, {} was known, {}", known, run.law.map_error());
+        assert!(off.abs() < 0.01, "{off} with {wb} Wb at {omega} rad/s");
+    }
+}
+
+/// At standstill a constant current shows the resistance alone; it is known then when the rotor turns, and what the EMF shows is the flux linkage's.
+#[test]
+fn a_standing_rotor_shows_the_resistance() {
+    let off = Off { ohm: 0.05, wb: -0.045, ..AS_RATED };
+    let told = |standing_s: f32| {
+        let mut run = Run::new(off);
+        run.drive(0.0, 900.0, standing_s);
+        let shown = run.law.map_error();
+        run.drive(84.0, 900.0, 0.1);
+        (shown, run.told_off().abs())
+    };
+    let [(shown, stood), (_, not)] = [1.0, 0.0].map(told);
+    assert_eq!(shown, 0.0, "of the flux linkage a standing rotor shows nothing");
+    assert!(stood < 0.5 * not, "{stood} of the largest torque, {not} without");
+}
+
+/// A mean that is hardly likely, as an inverter or a link with a fault has it, moves what is known no further than a likely one: 33 % of torque otherwise.
+#[test]
+fn a_voltage_that_is_hardly_likely_teaches_no_more_than_one_that_is() {
+    let mut run = Run::new(AS_RATED);
+    run.drive(84.0, 900.0, 0.01);
+    run.fault_v = 150.0;
+    run.drive(84.0, 900.0, 0.04);
+    run.fault_v = 0.0;
+    run.drive(84.0, 900.0, 0.5);
     let off = run.torque_nm() / 900.0 - 1.0;
-    assert!(off.abs() < 0.01, "{off}");
-    assert!((run.law.link_scale() - 1.0).abs() < 0.01, "{}", run.law.link_scale());
-    run.drive(500.0, 0.0, 1.0);
-    let seen = run.law.map_error();
-    assert!((seen / magnets - 1.0).abs() < 0.05, "{seen}, {magnets}");
+    println!("{off:.4}");
+    assert!(off.abs() < 0.16, "{off}");
 }
 
 #[test]

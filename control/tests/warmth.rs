@@ -39,7 +39,7 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
         let sample = RotorSample::new(law.target().current.unpark(angle.sin_cos()).abc(), angle, &tables);
         law.observe(&sample, &tables);
         if warmth != Warmth::NONE {
-            law.warm(warmth, &constants);
+            law.warm(warmth);
         }
         if period % 5 == 0 && period > 1_000 {
             let demand = Demand { torque_nm, slew_limited: true };
@@ -65,7 +65,7 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
 #[test]
 fn the_resistance_is_the_windings_in_the_voltage() {
     let [(current, _, cold_v), (_, _, hot_v)] =
-        [Warmth::NONE, Warmth::new(1.5, 0.0)].map(|warmth| driven(warmth, 0.0, 600.0, 1_500.0));
+        [Warmth::NONE, Warmth::new(1.5)].map(|warmth| driven(warmth, 0.0, 600.0, 1_500.0));
     let rated_ohm = tables().ratings.stator_resistance_ohm;
     assert!((cold_v - rated_ohm * current.length()).abs() < 1e-3 * cold_v, "{cold_v} V");
     assert!((hot_v / cold_v - 1.5).abs() < 1e-3, "{hot_v} V, {cold_v} V");
@@ -76,7 +76,7 @@ fn the_resistance_is_the_windings_in_the_voltage() {
 fn the_operating_point_keeps_the_voltage_with_a_warm_winding() {
     let (omega, ratings) = (4_000.0 / 60.0 * std::f32::consts::TAU * 4.0, tables().ratings);
     for (ratio, kept) in [(1.0, false), (1.5, true)] {
-        let (current, flux, _) = driven(Warmth::new(ratio, 0.0), 4_000.0, 1_235.0, 1_000.0);
+        let (current, flux, _) = driven(Warmth::new(ratio), 4_000.0, 1_235.0, 1_000.0);
         let hot = flux.j() * omega + current * (1.5 * ratings.stator_resistance_ohm);
         let over = hot.length() / six_step_v(1_000.0) - 1.0;
         assert_eq!(over < 1e-4, kept, "taken for {ratio} of the rating: {over}");

@@ -388,7 +388,7 @@ fn figures(line: &str) -> serde_json::Value {
     serde_json::to_value(chosen.figures(&recording, &machine).values()).unwrap()
 }
 
-/// By the map alone 10 to 12 % are missing with hot magnets, and 5 to 7 % too much is made with cold ones.
+/// Without the observer and its estimate 6 to 71 % are missing with hot magnets, and 3 to 30 % too much is made with cold ones.
 #[test]
 fn torque_is_corrected_for_hot_and_for_cold_magnets() {
     for percent in [-18, 11] {
@@ -407,14 +407,32 @@ fn torque_is_corrected_for_hot_and_for_cold_magnets() {
     }
 }
 
-/// Resistance, magnets and both gains at once: the torque that is told, in percent of the largest, with 2 % of it the gains' own.
+/// Magnets are known with a slow rotor as well, though the dead time hides them until a current flows: 16 % were missing while that was taken for another flux linkage.
+#[test]
+fn hot_magnets_are_known_behind_a_dead_time() {
+    for (percent, most) in [(-18, 2.5), (11, 1.5)] {
+        let figures =
+            figures(&format!("steady --speed 200 --torque 900 --magnets {percent} --dead-time-us 5"));
+        let off = figures["point"][0]["torque_error_percent"].as_f64().unwrap();
+        println!("{percent} %: {off:.2} %");
+        assert!(off.abs() < most, "{percent} %: {off} %");
+    }
+}
+
+/// Resistance, magnets and both gains at once: the torque that is told, in percent of the largest, from 5 % of rated speed on.
 #[test]
 fn torque_is_told_whatever_is_off() {
-    for gains in
-        ["--udc-gain 1 --current-gain 1", "--udc-gain -1 --current-gain 1", "--udc-gain 1 --current-gain -1"]
+    for gains in ["1 --current-gain 1", "-1 --current-gain 1", "1 --current-gain -1", "-1 --current-gain -1"]
     {
-        for point in ["200 --torque 1235", "400 --torque -600", "1500 --torque 1235", "3000 --torque 400"] {
-            let figures = figures(&format!("steady --speed {point} --rs-error 50 --magnets -10 {gains}"));
+        for point in [
+            "100 --torque 1235",
+            "200 --torque 1235",
+            "400 --torque -600",
+            "1500 --torque 1235",
+            "3000 --torque 400",
+        ] {
+            let figures =
+                figures(&format!("steady --speed {point} --rs-error 50 --magnets -10 --udc-gain {gains}"));
             let told = figures["point"][0]["told_error_percent"].as_f64().unwrap();
             println!("{point} {gains}: told {told:.2} %");
             assert!(told < 2.0, "{point} {gains}: {told} %");

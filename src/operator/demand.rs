@@ -324,7 +324,7 @@ mod tests {
     #[test]
     fn a_demand_that_is_dropped_keeps_its_derating() {
         let settings = Settings::rated(&BUILT_IN.ratings, 1e-3, None);
-        let warmth = Warmth::new(1.25, -0.05);
+        let warmth = Warmth::new(1.25);
         let mut demand = TorqueDemand { given_nm: 100.0, ..TorqueDemand::AT_REST };
         demand.derate(0.5, warmth);
         demand.drop();

@@ -1,6 +1,6 @@
 //! The magnets' temperature, from the flux linkage that the drive has learned: magnets lose flux as they warm.
 //!
-//! What the drive tells of it is one number, the error of the flux linkage along itself. It is the magnets' alone where hardly a current flows; and what is
+//! What the drive tells of it is one number, the error of the flux linkage along itself. It is the magnets' alone where hardly a current flows or the gates are off; and what is
 //! not temperature (a magnet's tolerance, an error of the link's sensor, which looks the same) shows as temperature: 1 % as 10 K.
 
 use super::Load;
@@ -20,7 +20,7 @@ pub struct Magnets {
 
 /// Share of the largest current below which the flux linkage is the magnets'.
 const SMALL: f32 = 0.05;
-/// Time for which the current must have been small, in s: five time constants of what learns the error.
+/// Time for which the current must have been small, in s: forty of the means that the error is learnt from.
 const SETTLED_S: f32 = 1.0;
 
 /// The estimate, in °C, and for how long the current has been small, in s.

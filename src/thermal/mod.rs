@@ -53,12 +53,10 @@ pub struct Thermal {
 }
 
 impl Thermal {
-    /// The warmth of a machine's winding, and of its magnets once their temperature is known, for the control law.
+    /// The warmth of a machine's winding, for the control law.
     pub fn warmth(&self, temperatures: &Temperatures, ratings: &Ratings) -> Warmth {
         let resistance_ohm = self.resistance_ohm * copper_factor(temperatures.winding_c);
-        let of_magnets = self.magnets.as_ref().zip(temperatures.magnets_c);
-        let share = of_magnets.map_or(0.0, |(magnets, celsius)| magnets.per_k * (celsius - magnets.map_c));
-        Warmth::new(resistance_ohm / ratings.stator_resistance_ohm, share)
+        Warmth::new(resistance_ohm / ratings.stator_resistance_ohm)
     }
 }
 

@@ -61,8 +61,7 @@ impl ControlPort for Flawed {
     }
 
     fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
-        let warm =
-            Warmth::new(1.0 + 0.1 * (self.period / 3_000) as f32, -0.02 * (self.period / 3_000) as f32);
+        let warm = Warmth::new(1.0 + 0.1 * (self.period / 3_000) as f32);
         let jump = Demand { slew_limited: false, ..self.board.walk.demand };
         DriveCommand {
             enable: !self.within(1_500, 200),

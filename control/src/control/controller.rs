@@ -163,11 +163,8 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
     }
 
     #[inline(always)]
-    fn warm(&mut self, warmth: Warmth, law: &Law) {
-        let ratio = warmth.resistance_ratio();
-        let known = (ratio - self.resistance_ratio) / law.gains.resistance_doubt;
-        self.resistance_ratio = ratio;
-        self.map_error.warm(warmth.magnet_share(), known);
+    fn warm(&mut self, warmth: Warmth) {
+        self.resistance_ratio = warmth.resistance_ratio();
     }
 
     #[inline(always)]
@@ -350,11 +347,10 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
     /// Mean torque since the last operating point, in N·m, of which the iron takes a part.
     #[inline(always)]
     fn measured_nm(&mut self, iron_nm: f32, period_s: f32) -> f32 {
-        let map_nm = self.sum_nm / self.samples as f32;
+        let mean_nm = self.sum_nm / self.samples as f32 * self.map_error.scales().torque - iron_nm;
         (self.sum_nm, self.samples) = (0.0, 0);
-        self.flowing_nm += (map_nm * self.map_error.known_torque_scale() - iron_nm - self.flowing_nm)
-            * (period_s / (period_s + TOLD_S));
-        map_nm * self.map_error.scales().torque - iron_nm
+        self.flowing_nm += (mean_nm - self.flowing_nm) * (period_s / (period_s + TOLD_S));
+        mean_nm
     }
 
     /// Stator resistance of a phase, in ohm.

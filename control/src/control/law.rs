@@ -81,8 +81,8 @@ pub trait ControlLaw {
         1.0
     }
 
-    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell, and
-    /// of a law that has no idea of it.
+    /// By how much the machine's flux linkage seems to exceed the map's, along itself, as a share: that of the operating point, with the gates off the magnets';
+    /// 0 until something has told, and of a law that has no idea of it.
     fn map_error(&self) -> f32 {
         0.0
     }
@@ -99,9 +99,8 @@ pub trait ControlLaw {
     /// The target of the current loop by the newest operating point; nothing while no pulses are made.
     fn target(&self) -> &Target;
 
-    /// Takes the machine's warmth into account from the next operating point on; call where there is time, as often as the operating point
-    /// changes. A law that knows nothing of temperatures goes on as rated.
-    fn warm(&mut self, _warmth: Warmth, _law: &Law) {}
+    /// Takes the machine's warmth into account from now on. A law that knows nothing of temperatures goes on as rated.
+    fn warm(&mut self, _warmth: Warmth) {}
 
     /// Finds what machine and link differ by from what they are taken for, of the voltage that nothing explains, and its use for the operating point: a part of it; call
     /// while pulses are made, at most once in a control period, where there is time. A law that has no idea of it does nothing.

@@ -7,42 +7,44 @@
 //!
 //! At one operating point ε and m make any Δψ, and a voltage has two components: three unknowns are not to be told apart there. A Kalman filter begins with what each is
 //! likely to be off by, takes the means of some halves at a time, and remembers what it has seen at other currents and speeds: without a current, which says nothing of
-//! the resistance, all the more of the magnets. It forgets within half a minute of telling, never by itself.
+//! the resistance, all the more of the magnets; of a rotor that stands the resistance alone. What nothing tells of stays; what something tells of is less sure after a
+//! while of it. ΔR is no one resistance: what devices take grows less than the current, `(σ R + V/√(i² + i₀²)) i` over its standard deviation.
 //!
 //! A link that is read too large by ε looks like a machine of which the flux linkage is larger by it, and for the loop both are the same. The torque tells
 //! them apart: as much of ε as a link sensor may be off is taken for that, and all volt-seconds are then those of a link of udc/(1 + ε); the larger ε is beyond, the less of it can
 //! be the sensor's, and the rest is the machine's. The operating point takes that into account: such a machine needs for a torque the current that the map gives for
-//! T/(1 + ΔT/T), and the voltage that it gives on a link of udc/(1 + Δψ/ψ). What [`super::Warmth`] knows of the magnets is taken into account whole, and only the rest is an error.
+//! T/(1 + ΔT/T), and the voltage that it gives on a link of udc/(1 + Δψ/ψ).
 
 use super::{Scales, flux_linkage, torque_nm};
 use crate::frames::{Dq, limit_magnitude, sqrt};
 use crate::machine::Tables;
 use crate::time::Clock;
 
-/// Speed from which a voltage tells something of the machine, as a share of the largest.
+/// Speed from which a voltage tells something of the flux linkage, as a share of the largest.
 const FROM: f32 = 0.015;
 /// Halves are averaged for so long, in s: what ripple and sixth harmonic make of them is nothing over some turns.
 const BLOCK_S: f32 = 0.025;
 /// Standard deviations, before anything is known, of ε, and of m as a share of the magnets' flux linkage.
 const SHARE: f32 = 0.1;
 const MAGNETS: f32 = 0.15;
-/// That of the voltage along a current, beyond the resistance's, as a share of the nominal link: where hardly a current flows, dead time and devices take as much.
-const DROP: f32 = 1e-3;
-/// Share of the largest current below which that falls with the current.
+/// That of the voltage along a current, beyond the resistance's, as a share of the nominal link: so much devices and dead time take, of a small current the less the
+/// smaller it is.
+const DROP: f32 = 4e-3;
+/// Share of the largest current below which that falls with the current, and below which its sign is not known in all phases.
 const SMALL: f32 = 0.05;
 /// Voltage that a mean holds besides, as shares of the nominal link and of the EMF.
 const LINK_NOISE: f32 = 3e-3;
 const EMF_NOISE: f32 = 4e-3;
-/// EMF over what the dead time takes from which it tells of the flux linkage.
-const TELLING: f32 = 3.0;
-/// The magnets' EMF over it from which it tells of them, beside all of the flux linkage.
-const TELLING_OF_MAGNETS: f32 = 6.0;
+/// EMF over what the dead time may take from which it tells of the flux linkage.
+const TELLING: f32 = 6.0;
+/// Part of what the dead time may take where the signs of all currents are known.
+const SURE: f32 = 0.2;
 /// Part of what the dead time takes that says nothing.
 const UNSAID: f32 = 0.25;
-/// Standard deviations of a voltage that is learnt from: a fault of the inverter or its link has more, and is no error of the machine.
-const LIKELY: f32 = 3.0;
-/// Time of telling in which what was told is forgotten, in s.
-const KNOWN_S: f32 = 30.0;
+/// Standard deviations of a voltage that is learnt from: an inverter or a link with a fault has more, and is no error of the machine.
+const LIKELY: f32 = 1.5;
+/// Time of telling in which what was told of each is forgotten, in s: a winding warms in a minute.
+const KNOWN_S: [f32; 3] = [30.0, 30.0, 10.0];
 /// Error that is the link sensor's: what it may look like.
 const LINK: f32 = 0.03;
 /// Part of that which is left alone: a sensor without an error is used as it is, bit for bit.
@@ -56,7 +58,7 @@ const LITTLE: f32 = 1e-3;
 /// Largest correction.
 const MOST: f32 = 0.25;
 
-/// ε, m and ΔR, each over its standard deviation before anything is known; or what a volt says of them.
+/// ε, m and ΔR, each over its standard deviation before anything is known; or the volts that such a deviation of each makes.
 type Unknown = [f32; 3];
 
 const NOTHING: Dq = Dq { d: 0.0, q: 0.0 };
@@ -123,8 +125,6 @@ struct Use {
     /// ε and m of them, m in Wb.
     whole: f32,
     magnets_wb: f32,
-    /// Torque over that of the map, as far as it is known.
-    known_torque: f32,
     /// Flux linkage, along itself, over that of the map, less 1, as far as it is known.
     share: f32,
     link_scale: f32,
@@ -182,8 +182,6 @@ pub struct MapError {
     next: Next,
     /// ε that the volt-seconds have already.
     explained: f32,
-    /// m that temperatures explain, as a share of the magnets' flux linkage.
-    warm: f32,
     used: Use,
 }
 
@@ -198,15 +196,7 @@ impl MapError {
             block: Block::NONE,
             next: Next::Use,
             explained: 0.0,
-            warm: 0.0,
-            used: Use {
-                scales: Scales::NONE,
-                whole: 0.0,
-                magnets_wb: 0.0,
-                known_torque: 1.0,
-                share: 0.0,
-                link_scale: 1.0,
-            },
+            used: Use { scales: Scales::NONE, whole: 0.0, magnets_wb: 0.0, share: 0.0, link_scale: 1.0 },
         }
     }
 
@@ -225,20 +215,17 @@ impl MapError {
         self.used.link_scale
     }
 
-    /// Torque over that of the map, as far as it is known.
-    pub fn known_torque_scale(&self) -> f32 {
-        self.used.known_torque
-    }
-
     /// Flux linkage, in Wb, that the machine has beyond one by the map, as far as it is corrected for.
     pub fn more_wb(&self, flux: Dq) -> Dq {
         let Use { whole, magnets_wb, .. } = self.used;
         Dq { d: flux.d * whole + magnets_wb, q: flux.q * whole }
     }
 
-    /// Begins anew with the next half; what is known stays.
+    /// Begins anew with the next half; what is known stays, and no current flows.
     pub fn pause(&mut self) {
         (self.sums, self.next) = (Sums::NONE, Next::Use);
+        let [share, magnets, _] = self.mean;
+        self.used.share = share * SHARE + magnets * MAGNETS;
     }
 
     /// Volt-seconds are those of a link of so many times what is read.
@@ -254,15 +241,6 @@ impl MapError {
         self.sums.voltage = self.sums.voltage + unexplained * length_s;
         self.sums.turn_rad += omega * length_s;
         self.sums.time_s += length_s;
-    }
-
-    /// Knowledge by temperatures: what the magnets' flux linkage is more than by the map, as a share, and the new part of the resistance, over its likely error. What was an
-    /// error until now is none.
-    pub fn warm(&mut self, magnets: f32, resistance: f32) {
-        let [_, of_magnets, of_resistance] = &mut self.mean;
-        *of_magnets -= (magnets - self.warm) * (1.0 / MAGNETS);
-        *of_resistance -= resistance;
-        self.warm = magnets;
     }
 
     /// A part of what there is to be done, of which each takes one call: use for the present current, and of each block either component. Call where there is time.
@@ -282,11 +260,8 @@ impl MapError {
     fn go_on(&mut self, input: &Input) {
         self.next = match self.next {
             Next::Rest => {
-                if self.closes_block(input.tables) {
-                    Next::AlongD
-                } else {
-                    Next::Rest
-                }
+                self.close_block();
+                Next::AlongD
             }
             Next::Use => {
                 self.make_use(input);
@@ -295,27 +270,23 @@ impl MapError {
             Next::AlongD => {
                 let Block { voltage, emf, current, .. } = self.block;
                 let needed = self.needed(-voltage.d, -emf.q, current.d * input.resistance);
-                let row = [-emf.q * self.share_tells(input), 0.0, current.d * self.drop_ohm(input)];
+                let row = [-emf.q * SHARE, 0.0, current.d * self.drop_ohm(input)];
                 self.observe(needed, row, input);
                 Next::AlongQ
             }
             Next::AlongQ => {
                 let Block { voltage, emf, current, omega, .. } = self.block;
                 let magnets_v = omega * input.tables.ratings.magnet_flux_wb;
-                let needed =
-                    self.needed(-voltage.q, emf.d, current.q * input.resistance) - magnets_v * self.warm;
-                let tells =
-                    if magnets_v.abs() > TELLING_OF_MAGNETS * input.dead.voltage_v { MAGNETS } else { 0.0 };
-                let row =
-                    [emf.d * self.share_tells(input), magnets_v * tells, current.q * self.drop_ohm(input)];
+                let needed = self.needed(-voltage.q, emf.d, current.q * input.resistance);
+                let row = [emf.d * SHARE, magnets_v * MAGNETS, current.q * self.drop_ohm(input)];
                 self.observe(needed, row, input);
                 Next::Use
             }
         };
     }
 
-    /// Makes means of the sums and begins anew; `true` if they tell something.
-    fn closes_block(&mut self, tables: &Tables) -> bool {
+    /// Makes means of the sums and begins anew.
+    fn close_block(&mut self) {
         let (sums, first, last) = (self.sums, self.first, self.newest);
         (self.sums, self.first) = (Sums::NONE, last);
         let per_s = 1.0 / sums.time_s;
@@ -328,7 +299,6 @@ impl MapError {
             omega,
             time_s: sums.time_s,
         };
-        omega.abs() >= FROM * (tables.ratings.max_speed_rad_s * tables.ratings.pole_pairs)
     }
 
     /// Voltage that is needed beyond EMF and drop on the link that is read, in V, where on the scaled one so much is.
@@ -341,13 +311,15 @@ impl MapError {
         let ratings = &input.tables.ratings;
         let small_a = SMALL * ratings.max_current_a;
         let likely_a = sqrt(self.block.current.squared() + small_a * small_a);
-        input.resistance_doubt * ratings.stator_resistance_ohm + DROP * ratings.dc_link_nominal_v / likely_a
+        input.resistance_doubt * (ratings.stator_resistance_ohm + DROP * ratings.dc_link_nominal_v / likely_a)
     }
 
-    /// Standard deviation of ε, where the EMF tells of it.
-    fn share_tells(&self, input: &Input) -> f32 {
-        let least_v = TELLING * input.dead.voltage_v;
-        if self.block.emf.squared() > least_v * least_v { SHARE } else { 0.0 }
+    /// Voltage that the dead time may take, in V: less the larger the current, as its sign is then known.
+    fn dead_v(&self, input: &Input) -> f32 {
+        let small_a = SMALL * input.tables.ratings.max_current_a;
+        let (small, large) = (small_a * small_a, self.block.current.squared());
+        let unsure = (small + SURE * large) / (small + large);
+        input.dead.voltage_v * unsure
     }
 
     /// A component of the voltage that is needed, in V, with what each unknown makes of it.
@@ -355,12 +327,15 @@ impl MapError {
     fn observe(&mut self, voltage_v: f32, row: Unknown, input: &Input) {
         let ratings = &input.tables.ratings;
         let link_v = LINK_NOISE * ratings.dc_link_nominal_v;
-        let small_a = SMALL * ratings.max_current_a;
-        let unsure = small_a * small_a / (small_a * small_a + self.block.current.squared());
-        let dead_v = input.dead.voltage_v * unsure;
-        let noise = link_v * link_v + dead_v * dead_v + (EMF_NOISE * EMF_NOISE) * self.block.emf.squared();
-        let gain = self.covariance.map(|line| dot(line, row));
-        let variance = dot(gain, row) + noise;
+        let (dead_v, emf_square) = (self.dead_v(input), self.block.emf.squared());
+        let noise = link_v * link_v + dead_v * dead_v + (EMF_NOISE * EMF_NOISE) * emf_square;
+        let [.., drop] = row;
+        // Where the dead time may take much of the EMF that says nothing of the flux linkage: what is known of it stays.
+        let slow = FROM * (ratings.max_speed_rad_s * ratings.pole_pairs);
+        let tells = emf_square > (TELLING * TELLING) * (dead_v * dead_v) && self.block.omega.abs() >= slow;
+        let told = if tells { row } else { [0.0, 0.0, drop] };
+        let gain = self.covariance.map(|line| dot(line, told));
+        let variance = dot(gain, told) + noise;
         let per = 1.0 / variance;
         let missing = voltage_v - dot(self.mean, row);
         if !missing.is_finite() {
@@ -369,11 +344,15 @@ impl MapError {
         // What the dead time explains says nothing, and what is hardly likely no more than what is.
         let missing = missing - limit_magnitude(missing, UNSAID * dead_v);
         let missing = limit_magnitude(missing, LIKELY * sqrt(variance)) * per;
-        let forgotten = self.block.time_s * (0.5 / KNOWN_S);
-        for (number, (line, along)) in self.covariance.iter_mut().zip(gain).enumerate() {
-            for (across, (entry, gain)) in line.iter_mut().zip(gain).enumerate() {
-                let first = if across == number { forgotten } else { 0.0 };
-                *entry = (*entry - along * per * gain) * (1.0 - forgotten) + first;
+        // Of each component half.
+        let passed_s = 0.5 * self.block.time_s;
+        let lost = told.map(|tells| if tells == 0.0 { 0.0 } else { passed_s });
+        let [share, magnets, drop] = lost;
+        let lost = [share * (1.0 / KNOWN_S[0]), magnets * (1.0 / KNOWN_S[1]), drop * (1.0 / KNOWN_S[2])];
+        for (number, ((line, along), mine)) in self.covariance.iter_mut().zip(gain).zip(lost).enumerate() {
+            for (across, ((entry, gain), others)) in line.iter_mut().zip(gain).zip(lost).enumerate() {
+                let first = if across == number { mine } else { 0.0 };
+                *entry = (*entry - along * per * gain) * (1.0 - 0.5 * (mine + others)) + first;
             }
         }
         for (mean, gain) in self.mean.iter_mut().zip(gain) {
@@ -405,7 +384,7 @@ impl MapError {
         let late = self.block.omega.abs() * input.dead.time_s;
         let error = links - within(links, LEFT_ALONE + late);
         let corrected = limit_magnitude(share - links, MOST);
-        let known_wb = (magnets + self.warm) * ratings.magnet_flux_wb;
+        let known_wb = magnets * ratings.magnet_flux_wb;
         let corrected_wb = known_wb - within(magnets, LEFT_TO_MAGNETS) * ratings.magnet_flux_wb;
         self.used = Use {
             scales: Scales {
@@ -414,7 +393,6 @@ impl MapError {
             },
             whole: corrected,
             magnets_wb: corrected_wb,
-            known_torque: 1.0 + limit_magnitude(share, MOST) + held(known_wb * per_wb.torque),
             share: share + held(known_wb * per_wb.flux),
             link_scale: 1.0 - error + error * error,
         };

@@ -13,7 +13,7 @@ use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
 use crate::control::{
-    AngleHarmonics, ControlLaw, Controller, LinkDamper, LinkRipple, Measurements, ModeLimits, Target, Warmth,
+    AngleHarmonics, ControlLaw, Controller, LinkDamper, LinkRipple, Measurements, ModeLimits, Target,
 };
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
@@ -90,7 +90,6 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     zeros: CurrentZeros,
     gains: CurrentGains,
     delay: CurrentDelay,
-    warmth: Warmth,
     diodes: DiodeWatch,
     pulses: Pulses,
 }
@@ -144,7 +143,6 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             zeros: CurrentZeros::new(),
             gains: CurrentGains::new(),
             delay: CurrentDelay::NONE,
-            warmth: Warmth::NONE,
         }
     }
 

@@ -8,7 +8,6 @@ use super::super::{Settings, Shared};
 use super::{ControlTask, Input};
 use crate::control::{
     AimInput, AngleHarmonics, ControlLaw, DeadTime, Demand, Law, LinkDamper, Measurements, RotorSample,
-    Warmth,
 };
 use crate::frames::{Angle, SinCos, six_step_v};
 use crate::machine::Machine;
@@ -43,7 +42,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let aims = (slot.aims || commands) && served().is_none_or(|aimed| slot.aims && is_old(&aimed));
         // Not in the longest periods, either.
         if !aims || slot.folds {
-            self.warm(input.command.warmth);
+            self.controller.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
             self.delay = self.delayed();
             let Settings { gains, clock, .. } = &self.settings;
@@ -93,16 +92,6 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     fn delayed(&self) -> CurrentDelay {
         let Settings { current_filter_ticks, clock, .. } = &self.settings;
         CurrentDelay::of(*current_filter_ticks, self.controller.omega(), clock)
-    }
-
-    /// Takes the machine's warmth into account, where its temperatures are measured.
-    #[inline(always)]
-    fn warm(&mut self, warmth: Warmth) {
-        if warmth != Warmth::NONE || self.warmth != Warmth::NONE {
-            let Settings { gains, clock, .. } = &self.settings;
-            self.controller.warm(warmth, &Law { gains, clock, tables: self.machine.tables() });
-            self.warmth = warmth;
-        }
     }
 
     /// Learns the position sensor's errors from an angle and its direction; not where the speed tracker follows them, and not where counts look like errors.
