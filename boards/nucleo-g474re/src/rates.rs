@@ -12,7 +12,7 @@ pub const CORE_HZ: u32 = 170_000_000;
 const COARSEST: u16 = 8;
 
 /// Cycles that the control interrupt takes at most, by the upper bound of `docs/cost.md`.
-pub const CONTROL_CYCLES: u32 = 5_230;
+pub const CONTROL_CYCLES: u32 = 5_210;
 
 /// Cycles that the control interrupt takes longer where it damps a line filter: its 77 instructions, at two cycles and a little each.
 pub const DAMPING_CYCLES: u32 = 170;
