@@ -173,6 +173,19 @@ fn a_wrong_gain_of_link_or_currents_is_the_torques_error_and_no_more() {
     }
 }
 
+/// All flaws of `--real`, a link that is read 1 % wrong and magnets that are 1 % weaker than the folder's among them.
+#[test]
+fn a_machine_behind_a_real_inverter_is_found() {
+    for name in ["pmasynrm-180kw", "pmsm-48v-1kw", "ipm-zs9"] {
+        let machine = Machine::load(name).unwrap();
+        let found = outcome(&machine, "--real");
+        keeps_its_place(&found);
+        assert!(found.torque_worst < 0.015, "{name}: {}", found.torque_worst);
+        let webers = found.magnet_error;
+        assert!(webers > 0.003 && webers < 0.015, "{name}: {webers}, of which 0.01 are the link sensor's");
+    }
+}
+
 #[test]
 fn the_machine_is_found_not_the_folder_that_the_drive_was_built_with() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();

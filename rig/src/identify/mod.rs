@@ -114,8 +114,8 @@ pub fn identified(identify: &Identify, machine: &Machine) -> Result<std::result:
     if let Some(interface) = &identify.can {
         return on_bus(interface, machine);
     }
-    let options = &identify.options;
-    Traction::check(options, &Map::new(), machine)?;
+    Traction::check(&identify.options, &Map::new(), machine)?;
+    let options = &Traction::filled(&identify.options, machine);
     let parameters = &machine.folder.parameters;
     let inertia_kg_m2 = identify.inertia.unwrap_or(parameters.rotor_inertia_kg_m2);
     let stand = Stand { inertia_kg_m2, fault_at_s: identify.fault_at };

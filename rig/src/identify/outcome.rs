@@ -18,6 +18,8 @@ use tractive_tablegen::{Optimum, SmoothMap};
 pub struct Truth {
     map: SmoothMap,
     flux_scale: f64,
+    /// Flux linkage of the magnets beyond the map's, in Wb.
+    more_wb: f64,
     resistance_ohm: f64,
     inertia_kg_m2: f64,
     pole_pairs: f64,
@@ -35,9 +37,12 @@ impl Truth {
         // Whichever conducts, half of the time each.
         let drops = options.own.flaws.drops();
         let slope_ohm = 0.5 * (drops.igbt_ohm + drops.diode_ohm);
+        let map = SmoothMap::new(&truth.folder.map);
+        let more_wb = options.own.flaws.magnets / 100.0 * map.at(0.0, 0.0).psi_d_wb;
         Ok(Self {
-            map: SmoothMap::new(&truth.folder.map),
+            map,
             flux_scale: plant.flux_scale,
+            more_wb,
             resistance_ohm: parameters.stator_resistance_ohm * plant.resistance_scale + slope_ohm,
             inertia_kg_m2,
             pole_pairs: parameters.pole_pairs.into(),
@@ -48,7 +53,7 @@ impl Truth {
     /// Flux linkages along d and q at a current in A, in Wb.
     pub fn flux(&self, id_a: f64, iq_a: f64) -> (f64, f64) {
         let at = self.map.at(id_a, iq_a);
-        (self.flux_scale * at.psi_d_wb, self.flux_scale * at.psi_q_wb)
+        (self.flux_scale * (at.psi_d_wb + self.more_wb), self.flux_scale * at.psi_q_wb)
     }
 
     /// Torque at a current in A, in N·m.

@@ -184,7 +184,9 @@ mod real {
     pub const RIPPLE_SHARE: f64 = 0.02;
     pub const RIPPLE_HZ: f64 = 300.0;
     pub const RS_ERROR_PERCENT: f64 = 20.0;
+    /// Of the converters' range, and no larger share of the largest current than where the drive trips at 1.31 of it.
     pub const OFFSET_PERCENT: [f64; 3] = [2.0, 0.0, 0.0];
+    pub const OFFSET_TRIP: f64 = 1.31;
     pub const GAINS_PERCENT: [f64; 3] = [1.0, -1.0, 0.0];
     pub const UDC_GAIN_PERCENT: f64 = 1.0;
     pub const FILTER_US: f64 = 10.0;
@@ -255,6 +257,13 @@ pub fn real_run(given: &RunOptions, machine: &Machine) -> RunOptions {
     }
 }
 
+/// The offset that `--real` stands for, for a machine: beyond a twentieth of the largest current the drive refuses it.
+fn real_offset(machine: &Machine) -> Phases {
+    let parameters = &machine.folder.parameters;
+    let share = (real::OFFSET_TRIP * parameters.max_current_a / parameters.trip_current_a).min(1.0);
+    Phases(real::OFFSET_PERCENT.map(|percent| percent * share))
+}
+
 /// The drops of devices that `--real` stands for, for a machine.
 pub fn real_drops(machine: &Machine) -> Drops {
     let parameters = &machine.folder.parameters;
@@ -278,7 +287,7 @@ impl Filled {
                 angle_deg: [or(once_deg, real::ANGLE_1F_DEG), or(twice_deg, real::ANGLE_2F_DEG)],
             },
             flaws: FlawOptions {
-                current_offset: flaws.current_offset.or(Some(Phases(real::OFFSET_PERCENT))),
+                current_offset: flaws.current_offset.or(Some(real_offset(machine))),
                 current_gains: flaws.current_gains.or(Some(Phases(real::GAINS_PERCENT))),
                 angle_jitter_us: or(flaws.angle_jitter_us, real::JITTER_US * times),
                 slots: or(flaws.slots, real::SLOTS_PERCENT),
