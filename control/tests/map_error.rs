@@ -285,12 +285,14 @@ fn what_is_known_stays_where_a_dead_time_hides_it() {
         for torque_nm in [0.0, 300.0, 900.0] {
             run.drive(500.0, torque_nm, 0.3);
         }
-        let known = run.law.map_error();
         run.drive(omega, 0.0, 0.5);
-        run.drive(omega, 900.0, 2.0);
-        let off = run.torque_nm() / 900.0 - 1.0;
-        println!("{wb} Wb, {omega} rad/s: {off:.4}, {} was known, {}", known, run.law.map_error());
-        assert!(off.abs() < 0.01, "{off} with {wb} Wb at {omega} rad/s");
+        run.drive(omega, 100.0, 4.0);
+        let slow = run.torque_nm() / 100.0 - 1.0;
+        // Nor was it put into the resistance.
+        run.drive(84.0, 100.0, 0.3);
+        let off = run.torque_nm() / 100.0 - 1.0;
+        println!("{wb} Wb, {omega} rad/s: {slow:.4}, then {off:.4}");
+        assert!(slow.abs() < 0.005 && off.abs() < 0.005, "{slow}, {off} with {wb} Wb at {omega} rad/s");
     }
 }
 

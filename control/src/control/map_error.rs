@@ -8,7 +8,7 @@
 //! At one operating point ε and m make any Δψ, and a voltage has two components: three unknowns are not to be told apart there. A Kalman filter begins with what each is
 //! likely to be off by, takes the means of some halves at a time, and remembers what it has seen at other currents and speeds: without a current, which says nothing of
 //! the resistance, all the more of the magnets; of a rotor that stands the resistance alone. What nothing tells of stays; what something tells of is less sure after a
-//! while of it. ΔR is no one resistance: what devices take grows less than the current, `(σ R + V/√(i² + i₀²)) i` over its standard deviation.
+//! while of it. ΔR is no one resistance: what devices take grows less than the current, `σ (R + V/√(i² + i₀²)) i` for a standard deviation, with σ the doubt of the resistance.
 //!
 //! A link that is read too large by ε looks like a machine of which the flux linkage is larger by it, and for the loop both are the same. The torque tells
 //! them apart: as much of ε as a link sensor may be off is taken for that, and all volt-seconds are then those of a link of udc/(1 + ε); the larger ε is beyond, the less of it can
@@ -27,8 +27,8 @@ const BLOCK_S: f32 = 0.025;
 /// Standard deviations, before anything is known, of ε, and of m as a share of the magnets' flux linkage.
 const SHARE: f32 = 0.1;
 const MAGNETS: f32 = 0.15;
-/// That of the voltage along a current, beyond the resistance's, as a share of the nominal link: so much devices and dead time take, of a small current the less the
-/// smaller it is.
+/// That of the voltage along a current, beyond the resistance's, over the doubt of the resistance, as a share of the nominal link: half of it is what devices take of a usual
+/// inverter, of a small current the less the smaller it is.
 const DROP: f32 = 4e-3;
 /// Share of the largest current below which that falls with the current, and below which its sign is not known in all phases.
 const SMALL: f32 = 0.05;
