@@ -65,7 +65,7 @@ pub type LegEdge = (f64, usize, bool);
 const LONGEST_S: f64 = 100.0;
 
 /// Highest stator frequency, in Hz: far beyond what any mode is for.
-const HIGHEST_HZ: f64 = 1_000.0;
+const HIGHEST_HZ: f64 = 5_000.0;
 
 /// The upper devices' changes over whole fundamental periods, and at their beginning their levels.
 pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {

@@ -10,15 +10,15 @@ use core::f64::consts::TAU;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-/// Highest frequency that is drawn, in Hz: a little above twice 900 Hz.
-const HIGHEST_HZ: f64 = 3_000.0;
+/// Highest frequency that is drawn, over `max_switching_hz`: a little above three times it, 3 kHz of 900 Hz.
+const HIGHEST: f64 = 10.0 / 3.0;
 /// Smallest line that is drawn, in percent of the fundamental.
 const SMALLEST_PERCENT: f64 = 0.02;
-/// By how much the bound's lines stand beside the measured ones, in Hz.
-const BESIDE_HZ: f64 = 8.0;
+/// By how much the bound's lines stand beside the measured ones, as a share of the highest frequency.
+const BESIDE: f64 = 8.0 / 3_000.0;
 
-/// Half the foot of a line, in Hz: a curve has one value at a frequency.
-const FOOT_HZ: f64 = 0.1;
+/// Half the foot of a line, as a share of the highest frequency: a curve has one value at a frequency.
+const FOOT: f64 = 0.1 / 3_000.0;
 
 /// Draws the spectrum in a window of a recording, under a title, and that of its bound, without the fundamental.
 pub fn draw(
@@ -34,17 +34,18 @@ pub fn draw(
     else {
         return;
     };
+    let highest_hz = HIGHEST * machine.folder.parameters.max_switching_hz;
     let measured = distortion::samples(recording, window, &machine.folder);
-    let mut series = vec![("measured", lines(&measured, f1_hz, 0.0))];
+    let mut series = vec![("measured", lines(&measured, f1_hz, (0.0, highest_hz)))];
     if let Some(ideal) = bound::ideal(rows, options, machine) {
-        series.push(("bound", lines(&ideal, f1_hz, BESIDE_HZ)));
+        series.push(("bound", lines(&ideal, f1_hz, (BESIDE * highest_hz, highest_hz))));
     }
     let heading = format!("Spectrum of phase current u without its fundamental · {title}");
     page.curves(&heading, "frequency in Hz", "% of the fundamental", &series);
 }
 
-/// A spectrum as lines that stand on the axis.
-fn lines(samples: &Samples, f1_hz: f64, beside_hz: f64) -> Vec<(f64, f64)> {
+/// A spectrum as lines that stand on the axis, so many Hz beside their place, up to a frequency in Hz.
+fn lines(samples: &Samples, f1_hz: f64, (beside_hz, highest_hz): (f64, f64)) -> Vec<(f64, f64)> {
     let (fundamental_a, rest) = samples.without_fundamental();
     let count = rest.len();
     let mut bins: Vec<_> = rest.into_iter().map(|current_a| Complex::new(current_a, 0.0)).collect();
@@ -52,15 +53,16 @@ fn lines(samples: &Samples, f1_hz: f64, beside_hz: f64) -> Vec<(f64, f64)> {
     let turned = samples.angle.last().zip(samples.angle.first()).map_or(0.0, |(last, first)| last - first);
     // One more sample would complete the last turn.
     let turns = turned / TAU * count as f64 / (count.max(2) - 1) as f64;
+    let foot_hz = FOOT * highest_hz;
     let mut points = vec![(0.0, 0.0)];
     for (bin, value) in bins.iter().enumerate().take(count / 2).skip(1) {
         let hertz = bin as f64 / turns.abs() * f1_hz;
         let percent = 200.0 * value.norm() / count as f64 / fundamental_a;
-        if hertz < HIGHEST_HZ && percent > SMALLEST_PERCENT {
+        if hertz < highest_hz && percent > SMALLEST_PERCENT {
             let at = hertz + beside_hz;
-            points.extend([(at - FOOT_HZ, 0.0), (at, percent), (at + FOOT_HZ, 0.0)]);
+            points.extend([(at - foot_hz, 0.0), (at, percent), (at + foot_hz, 0.0)]);
         }
     }
-    points.push((HIGHEST_HZ, 0.0));
+    points.push((highest_hz, 0.0));
     points
 }

@@ -117,6 +117,34 @@ fn a_ripple_that_leaves_no_trip_its_room_is_told_as_one() {
     assert_eq!((said.trim().lines().count(), std::fs::read_dir(folder.path()).unwrap().count()), (1, 0));
 }
 
+/// A hundred thousand carriers in a turn: what their ticks round is no ripple. Nor are speeds of more than 1 kHz without pulses.
+#[test]
+fn a_fast_machine_trips_near_its_largest_current() {
+    let folder = tempfile::tempdir().unwrap();
+    let car = "--pole-pairs 4 --rs 0.009 --ld 0.12e-3 --lq 0.30e-3 --psi-f 0.068 --max-current 500 --udc 800 --max-speed-rpm 16000";
+    for (hz, saturation, trip_a) in [
+        (10_000, "1", 600.0..=700.0),
+        (20_000, "1", 600.0..=700.0),
+        (10_000, "0.5", 800.0..=850.0),
+        (20_000, "0.5", 700.0..=750.0),
+    ] {
+        let values = format!("{car} --max-switching-hz {hz} --saturation {saturation}");
+        let made = folder.path().join(format!("made-{hz}-{saturation}"));
+        let output = new(&values, &made);
+        assert!(output.status.success(), "{values}: {output:?}");
+        let machine = Machine::load(made.to_str().unwrap()).unwrap();
+        let set_a = machine.folder.parameters.trip_current_a;
+        assert!(trip_a.contains(&set_a), "{values}: trip at {set_a} A");
+        let mut show = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        let page = folder.path().join("page.html");
+        let shown =
+            show.args(["machine", "show", "--json"]).arg(&made).arg("--out").arg(page).output().unwrap();
+        let figures: serde_json::Value = serde_json::from_slice(&shown.stdout).unwrap();
+        let rows = figures["figures"]["limits"].as_array().unwrap();
+        assert!(rows.iter().all(|row| row["peak_current_a"].is_f64()), "pulses at up to 1,067 Hz: {rows:?}");
+    }
+}
+
 #[test]
 fn a_folder_is_made_whole_replaced_whole_and_others_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();

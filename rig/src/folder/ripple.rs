@@ -12,6 +12,10 @@ pub const ROOM: f64 = 0.15;
 /// Highest trip that the table generator takes, as a share of the largest current.
 pub const MOST_TRIP: f64 = 4.0;
 
+/// Most carriers in a turn of the voltage: with more of them the ripple is the same, and what the pulses' ticks round adds up to flux linkage that
+/// a drive would take out.
+const MOST_CARRIERS: f64 = 200.0;
+
 /// The current that the drive trips at, in A, where the machine's own default leaves the ripple no room: in steady state at full torque, of any mode and
 /// link in normal operation, the current stays well below it.
 pub fn trip_current_a(machine: &Machine) -> Option<f64> {
@@ -26,7 +30,9 @@ fn highest_a(machine: &Machine) -> f64 {
     let parameters = &machine.folder.parameters;
     let links = [parameters.dc_link_min_v, parameters.dc_link_nominal_v, parameters.dc_link_max_v];
     let modes = links.iter().flat_map(|udc_v| view.modes(*udc_v).into_iter().map(move |mode| (*udc_v, mode)));
+    let slowest_rpm = 60.0 / f64::from(parameters.pole_pairs) * parameters.max_switching_hz / MOST_CARRIERS;
     let ends = modes.flat_map(|(udc_v, (mode, from, to))| {
+        let from = from.max(slowest_rpm).min(to);
         [from, 0.5 * (from + to), to].map(|speed_rpm| (udc_v, mode, speed_rpm))
     });
     ends.filter_map(|(udc_v, mode, speed_rpm)| view.peak_a(mode, speed_rpm, udc_v)).fold(0.0, f64::max)
