@@ -74,8 +74,8 @@ fn a_machine_with_other_flux_than_the_map_is_caught_within_its_current() {
     assert_eq!(over, 0, "of {} cases", cases.len());
 }
 
-/// Machines whose magnets drive current through the diodes into the link, one with magnets on the surface and one with buried ones, are caught with no more current than
-/// the machine's or the diodes' own, at twelve angles each. Led by a carrier the first tripped. Faster yet the second one's diodes trip it as it coasts.
+/// Machines whose magnets drive current through the diodes into the link, with magnets on the surface and buried, are caught with no more current than
+/// the machine's or the diodes' own, at twelve angles each. Led by a carrier the first tripped, as did the third by one that was cut off. Faster yet the second one's diodes trip it as it coasts.
 #[test]
 fn a_machine_whose_diodes_conduct_is_caught_as_it_coasts() {
     for (values, speeds_rpm) in [
@@ -86,6 +86,11 @@ fn a_machine_whose_diodes_conduct_is_caught_as_it_coasts() {
         (
             "--pole-pairs 3 --rs 0.199 --ld 0.00132 --lq 0.00312 --psi-f 0.00792 --saturation 0.8 --max-current 4.82 --udc 24 --max-speed-rpm 9345 --max-switching-hz 2000",
             [7_009.0, 8_200.0],
+        ),
+        (
+            // Its diodes just conduct: a carrier leads the flux linkage over as much as 100°, 18 halves of 8 kHz.
+            "--pole-pairs 4 --rs 1.1 --ld 0.0055 --lq 0.0065 --psi-f 0.155 --max-current 35 --udc 560 --max-speed-rpm 6600 --max-switching-hz 8000",
+            [5_600.0, 5_800.0],
         ),
     ] {
         let folder = made(values);

@@ -8,7 +8,7 @@ use super::position::PositionState;
 use super::power_stage::{CORE_HZ, POWER_STAGE, THERMAL};
 use super::registers::Registers;
 use super::serve::{Serve, Station};
-use super::start::{self, Found, Plan, StartError, Timeout, Wait};
+use super::start::{self, Found, StartError, Timeout, Wait};
 use super::watchdog::Pulse;
 use super::{CLOCK, clock};
 use crate::built_in::traction::BUILT_IN;
@@ -17,6 +17,7 @@ use defmt_rtt as _;
 pub use stm32_metapac::Interrupt;
 use stm32_metapac::rcc::vals::Sw;
 use tractive::drive::traction::Shared;
+use tractive::modulation::SwitchLimits;
 use tractive::operator::{self, Configuration, Line, Slot, slot_s};
 use tractive::protection::FailedCheck;
 use tractive::protocol::{CanEndpoint, Message, TO_DRIVE};
@@ -96,8 +97,8 @@ pub(super) fn pause_a_slot() {
 }
 
 /// Configures everything, gates off. Call it once.
-pub fn prepare(plan: Plan) -> Result<Found, StartError> {
-    let found = start::prepare(&Registers::CHIP, &mut Cycles, plan);
+pub fn prepare(devices: SwitchLimits) -> Result<Found, StartError> {
+    let found = start::prepare(&Registers::CHIP, &mut Cycles, devices);
     join_bus(found, &TO_DRIVE, &pins::PINS)
 }
 

@@ -16,7 +16,6 @@ mod firmware {
     use nucleo_g474re::power_stage::POWER_STAGE;
     use nucleo_g474re::registers::Registers;
     use nucleo_g474re::sampling::KeptZeros;
-    use nucleo_g474re::start::Plan;
     use nucleo_g474re::{
         self as board, CLOCK, Control, Interrupt as interrupt, POSITION, PULSE, Pwm, SHARED,
     };
@@ -42,8 +41,7 @@ mod firmware {
 
     /// Starts the drive; the error is why it is refused.
     fn start() -> Result<(), FailedCheck> {
-        let plan = Plan { shortest_half_ticks: settings().devices.shortest_half_ticks };
-        let found = board::prepare(plan).map_err(|error| error.failed())?;
+        let found = board::prepare(settings().devices).map_err(|error| error.failed())?;
         CONTROL_ZEROS.keep(found.control_zeros);
         PWM_ZEROS.keep(found.pwm_zeros);
         board::run();

@@ -41,9 +41,6 @@ pub const fn clock(control_hz: u32) -> Clock {
 /// The longest half, in ticks: a compare of 65,535 must lie beyond the counter's last value.
 pub const LONGEST_HALF_TICKS: u32 = 65_535;
 
-/// Halves of the lowest carrier in one of the highest.
-pub const CARRIER_RANGE: u32 = 4;
-
 /// A time in ns as cycles of [`CORE_HZ`], rounded up.
 pub const fn ns_to_cycles(ns: u32) -> u32 {
     (ns as u64 * CORE_HZ as u64).div_ceil(1_000_000_000) as u32

@@ -7,19 +7,12 @@ use super::outputs::Outputs;
 use super::pins::{self, Pin};
 use super::position::{Position, Sensor};
 use super::power_stage::{POWER_STAGE, PowerStage};
-use super::rates::CARRIER_RANGE;
 use super::registers::Registers;
 use super::sampling::{self, Sampler, Zeros};
 pub use super::start_error::StartError;
 pub use super::wait::{Timeout, Wait};
 use super::{CLOCK, PRESCALER, clock, switchgear, temperatures, watchdog};
-
-/// The length of the first carrier half, and the needs of the machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Plan {
-    /// The shortest carrier half, in ticks; the longest is four times as long.
-    pub shortest_half_ticks: u32,
-}
+use tractive::modulation::SwitchLimits;
 
 /// The findings of the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,7 +32,7 @@ pub struct Start<'a> {
     /// The power stage.
     pub stage: &'a PowerStage,
     /// The carrier.
-    pub plan: Plan,
+    pub devices: SwitchLimits,
     /// Filled in on the way.
     pub found: Found,
 }
@@ -92,8 +85,12 @@ pub const STEPS: [(&str, Step); 13] = [
 ];
 
 /// All steps; after one that fails all outputs are off for good.
-pub fn prepare(registers: &Registers, wait: &mut dyn Wait, plan: Plan) -> Result<Found, StartError> {
-    let mut start = Start { registers, wait, stage: &POWER_STAGE, plan, found: Found::default() };
+pub fn prepare(
+    registers: &Registers,
+    wait: &mut dyn Wait,
+    devices: SwitchLimits,
+) -> Result<Found, StartError> {
+    let mut start = Start { registers, wait, stage: &POWER_STAGE, devices, found: Found::default() };
     let done = STEPS.iter().try_for_each(|(_, step)| step(&mut start));
     done.inspect_err(|_| switch_off(registers, &pins::PINS)).and(Ok(start.found))
 }
@@ -143,8 +140,8 @@ pub const fn pwm_sampler(registers: &Registers) -> Sampler {
 }
 
 fn configure_legs(start: &mut Start) -> Result<(), StartError> {
-    let shortest = start.plan.shortest_half_ticks;
-    let longest_ticks = shortest.saturating_mul(CARRIER_RANGE);
+    let shortest = start.devices.shortest_half_ticks;
+    let longest_ticks = start.devices.longest_half_ticks();
     if shortest == 0 || longest_ticks > half::LONGEST_HALF_TICKS {
         return Err(StartError::Carrier { longest_ticks });
     }

@@ -116,6 +116,35 @@ mod tests {
         }
     }
 
+    /// Every 5° at the lowest frequencies of the locked modes, of slow devices and of fast ones: the first half is as long as its angle.
+    #[test]
+    fn the_first_half_ends_at_the_angle_of_its_boundary() {
+        let mut starts = 0;
+        for (max_switching_hz, hz) in [(900.0, 100.0), (8_000.0, 360.0), (20_000.0, 900.0)] {
+            let clock = Clock::new(25_000_000, 1_250);
+            let devices = SwitchLimits::new(25, 0, max_switching_hz, &clock);
+            let rate = (hz * 4_294_967_296.0 / 25e6) as f32;
+            for mode in [Mode::Mid7, Mode::Mid3, Mode::Square] {
+                for angle in (0..72).map(|step| Angle::from_turns(step as f32 / 72.0)) {
+                    let mut modulator = Modulator::new(devices, Schedule::fixed(mode, &clock));
+                    // As much flux linkage as the pattern has, all but a twentieth.
+                    let seen = Reference::turning(600.0, angle, rate, Instant(0), 1_000.0);
+                    let seen = Reference { vector: seen.vector * 0.95, ..seen };
+                    let half = modulator.step(Instant(0), Some(&seen));
+                    let off = seen.pulse_at(Instant(half.period_ticks)) - half.end_angle().unwrap();
+                    let off_deg = off.signed() as f32 * (360.0 / 4_294_967_296.0);
+                    assert!(
+                        off_deg.abs() < 0.5,
+                        "{max_switching_hz} Hz {} {angle:?}: {off_deg}°",
+                        mode.name()
+                    );
+                    starts += 1;
+                }
+            }
+        }
+        assert_eq!(starts, 648);
+    }
+
     /// Every 5°, forward and backward: square wave begins with one of the two edges beside its voltage and the link's whole voltage; led by a carrier, with none.
     #[test]
     fn square_wave_begins_where_the_diodes_are() {

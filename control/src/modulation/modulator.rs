@@ -399,7 +399,7 @@ impl Modulator {
     /// of a stopped carrier.
     #[inline(never)]
     fn whole_ticks(&self, period: f32) -> u32 {
-        ((period + 0.5) as u32).min(self.devices.shortest_half_ticks * 4).max(1)
+        ((period + 0.5) as u32).min(self.devices.longest_half_ticks()).max(1)
     }
 }
 

@@ -30,4 +30,22 @@ impl SwitchLimits {
         let half = (clock.ticks_per_s / (2.0 * max_switching_hz)) as u32 + 1;
         Self { min_pulse_ticks, dead_time_ticks, shortest_half_ticks: half }
     }
+
+    /// The least that [`SwitchLimits::longest_half_ticks`] is, in shortest halves.
+    pub const LEAST_RANGE: u32 = 4;
+
+    /// Length of the longest carrier half, in ticks: of a stopped carrier that is locked to the angle. Modes are locked from 1/23.7 of the highest switching
+    /// frequency up; there the longest half that leads the flux linkage to a pattern, over 135°, lasts 17.8 of the shortest. It is 20 of them as far as
+    /// timers of 16 bits count, but 4 at least.
+    pub const fn longest_half_ticks(&self) -> u32 {
+        const COUNTED: u32 = 65_000;
+        let (most, least) = (20 * self.shortest_half_ticks, Self::LEAST_RANGE * self.shortest_half_ticks);
+        if most < COUNTED {
+            most
+        } else if least < COUNTED {
+            COUNTED
+        } else {
+            least
+        }
+    }
 }

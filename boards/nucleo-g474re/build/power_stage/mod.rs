@@ -12,6 +12,7 @@ use super::{rates, zs9_rates};
 use keys::{Keys, ZSource};
 use stage::{Bound, CODES, HALF_CODES, Stage, angle, shown};
 use std::path::Path;
+use tractive::modulation::SwitchLimits;
 use tractive_tablegen::InputError;
 
 /// The longest dead time that the ZS9's drive reckons with, in ns.
@@ -42,10 +43,10 @@ pub fn traction(file: &Path, text: &str, machine: &Machine) -> Result<String, In
     let carrier_hz = machine.carrier_share * ratings.max_switching_hz;
     let settings = rates::settings(control_hz, min_pulse_ns, *dead_time_ns, carrier_hz, behind);
     // The longest carrier half of a machine that switches slowly.
-    let longest_ticks = settings.devices.shortest_half_ticks.saturating_mul(rates::CARRIER_RANGE);
+    let longest_ticks = settings.devices.longest_half_ticks();
     if longest_ticks > rates::LONGEST_HALF_TICKS {
-        let least_hz = f64::from(settings.clock.ticks_per_s) * f64::from(rates::CARRIER_RANGE)
-            / f64::from(2 * (rates::LONGEST_HALF_TICKS - rates::CARRIER_RANGE));
+        let least_hz = f64::from(settings.clock.ticks_per_s) * f64::from(SwitchLimits::LEAST_RANGE)
+            / f64::from(2 * (rates::LONGEST_HALF_TICKS - SwitchLimits::LEAST_RANGE));
         return Err(machine.refuse(format!(
             "max_switching_hz: {}: must be at least {}: the timers' 16 bits hold no longer carrier half",
             ratings.max_switching_hz,

@@ -174,11 +174,11 @@ impl Bench {
     }
 
     /// The bench after a whole start.
-    pub fn started(plan: nucleo_g474re::start::Plan) -> Self {
+    pub fn started(devices: tractive::modulation::SwitchLimits) -> Self {
         use nucleo_g474re::start;
         let mut bench = Self::new();
         let registers = bench.registers;
-        start::prepare(&registers, &mut bench, plan).unwrap();
+        start::prepare(&registers, &mut bench, devices).unwrap();
         start::run(&registers, &mut bench);
         bench.settle();
         bench

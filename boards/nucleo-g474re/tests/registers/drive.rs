@@ -1,7 +1,7 @@
 //! The drive's own two tasks on the board in memory.
 
 use crate::bench::{Bench, control_update};
-use crate::{devices, plan};
+use crate::devices;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::position::{Encoder, PositionState};
 use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
@@ -35,7 +35,7 @@ impl PwmPort for Served<'_> {
 
 #[test]
 fn the_drive_pulses_a_turning_machine_through_the_registers() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     bench.codes[6] = (1_500.0 / POWER_STAGE.udc_v_per_code) as u16;
     let registers = bench.registers;
     let (shared, state) = (Shared::new(), PositionState::new());
@@ -44,7 +44,7 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     let mut control = Control::new(registers, zeros, encoder, &state);
     let mut pwm = Pwm::new(registers, zeros);
-    let first_half = Instant(plan().shortest_half_ticks);
+    let first_half = Instant(devices().shortest_half_ticks);
     let mut control_task = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
     let mut pwm_task = PwmTask::new(&BUILT_IN, settings, first_half);
     registers.tim4.sr().write(|w| w.set_idxif(true));

@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, control_update};
 use crate::bus::{Bus, Sender};
-use crate::{devices, plan};
+use crate::devices;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::position::{Encoder, PositionState};
 use nucleo_g474re::power_stage::{POWER_STAGE, PowerStage};
@@ -179,7 +179,7 @@ impl Image {
     fn reset(turns: f64, rpm: f64, zero: Angle) -> Self {
         let mut bench = Bench::new();
         let registers = bench.registers;
-        let found = start::prepare(&registers, &mut bench, plan()).unwrap();
+        let found = start::prepare(&registers, &mut bench, devices()).unwrap();
         let bus = Bus::new(&TO_DRIVE, &registers, &mut bench);
         start::run(&registers, &mut bench);
         bench.settle();
@@ -211,7 +211,7 @@ impl Image {
             control: Control::new(registers, found.control_zeros, encoder, position),
             pwm: Pwm::new(registers, found.pwm_zeros),
             control_task: ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks)),
-            pwm_task: PwmTask::new(&BUILT_IN, settings, Instant(plan().shortest_half_ticks)),
+            pwm_task: PwmTask::new(&BUILT_IN, settings, Instant(devices().shortest_half_ticks)),
             serve: Serve::new(registers, bus.can, station, position, Configuration::Good),
             slot: Slot::new(),
             pulse: Pulse::new(),

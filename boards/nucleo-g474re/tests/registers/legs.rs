@@ -1,7 +1,7 @@
 //! The legs: what each half writes, and that no two devices of a leg are ever on.
 
 use crate::bench::Bench;
-use crate::{devices, plan};
+use crate::devices;
 use nucleo_g474re::half::reload;
 use nucleo_g474re::sampling::Zeros;
 use nucleo_g474re::{CLOCK, Pwm};
@@ -22,7 +22,7 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
-        let bench = Bench::started(plan());
+        let bench = Bench::started(devices());
         let pwm = Pwm::new(bench.registers, Zeros::default());
         Self { bench, pwm }
     }

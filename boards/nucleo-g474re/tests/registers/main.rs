@@ -18,7 +18,6 @@ mod zs9;
 use nucleo_g474re::CLOCK;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::power_stage::{POWER_STAGE, cycles_to_ticks, ns_to_cycles};
-use nucleo_g474re::start::Plan;
 use tractive::modulation::SwitchLimits;
 
 /// The carrier of the machine that is built in.
@@ -30,8 +29,4 @@ fn devices() -> SwitchLimits {
         BUILT_IN.ratings.max_switching_hz,
         &CLOCK,
     )
-}
-
-fn plan() -> Plan {
-    Plan { shortest_half_ticks: devices().shortest_half_ticks }
 }

@@ -1,7 +1,7 @@
 //! The exchange between the operator and the board, and the end of a fault.
 
 use crate::bench::Bench;
-use crate::plan;
+use crate::devices;
 use crate::temperatures::done;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::can::Can;
@@ -53,7 +53,7 @@ fn the_switchgear_is_off_before_its_pins_are_outputs() {
         // Nothing is ever set on the way through the start.
         assert_eq!(bits_written(registers.gpioc).0, 0);
     };
-    nucleo_g474re::start::prepare(&registers, &mut bench, plan()).unwrap();
+    nucleo_g474re::start::prepare(&registers, &mut bench, devices()).unwrap();
     assert_eq!(bits_written(registers.gpioc).0, 0);
     let switches: Vec<_> = PINS.iter().filter(|pin| pin.function == Function::Switch).collect();
     assert_eq!(switches.len(), 3);
@@ -71,7 +71,7 @@ fn the_switchgear_is_off_before_its_pins_are_outputs() {
 
 #[test]
 fn each_switch_has_its_pin_and_the_chopper_its_duty() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     for (switches, last) in [
         (Switches { precharge: true, ..Switches::default() }, (1 << 8, 0)),
         (Switches { main: true, ..Switches::default() }, (1 << 9, 0)),
@@ -90,7 +90,7 @@ fn each_switch_has_its_pin_and_the_chopper_its_duty() {
 
 #[test]
 fn the_operator_hears_of_contacts_drivers_and_inputs() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let state = PositionState::new();
     let station = CanEndpoint::new(&BUILT_IN.ratings);
     // The bus is not touched by what is tested here.
@@ -121,7 +121,7 @@ fn the_operator_hears_of_contacts_drivers_and_inputs() {
 /// An angle that is not known and that the drive can find, and the voltages of the temperature sensors.
 #[test]
 fn the_operator_hears_of_a_count_and_of_the_temperature_sensors() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let state = PositionState::new();
     let station = CanEndpoint::new(&BUILT_IN.ratings);
     let mut serve = Serve::new(registers, Can::CHIP, station, &state, Configuration::Good);
@@ -170,7 +170,7 @@ fn an_identification_tells_of_itself_where_the_drives_frames_leave_room() {
 
 #[test]
 fn a_break_has_the_name_of_its_cause() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let registers = bench.registers;
     drivers_ready(&registers, true);
     assert_eq!(hardware::latched_by(&registers), None);
@@ -187,7 +187,7 @@ fn a_break_has_the_name_of_its_cause() {
 
 /// A half in which every leg stands high.
 fn high() -> CarrierHalf {
-    let mut half = CarrierHalf::off(plan().shortest_half_ticks);
+    let mut half = CarrierHalf::off(devices().shortest_half_ticks);
     (half.mode, half.start_levels, half.compare_ticks) = (Mode::Async, [true; 3], [u32::MAX; 3]);
     half
 }
@@ -212,7 +212,7 @@ fn pulses(bench: &mut Bench, pwm: &mut Pwm) -> bool {
 #[test]
 fn a_safe_state_is_left_with_the_gates_off_and_pulses_follow() {
     for safe in [SafeState::GatesOff, SafeState::ShortCircuit] {
-        let mut bench = Bench::started(plan());
+        let mut bench = Bench::started(devices());
         let mut pwm = Pwm::new(bench.registers, [AdcCode(2_048); 3]);
         assert!(pulses(&mut bench, &mut pwm), "before");
         pwm.enter(safe, NOW);
@@ -231,7 +231,7 @@ fn a_safe_state_is_left_with_the_gates_off_and_pulses_follow() {
 /// The interrupt of a boundary that comes meanwhile is not lost.
 #[test]
 fn a_break_is_forgotten_and_a_boundary_is_not() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let legs = bench.registers.legs;
     legs.trip();
     while !bench.tick() {}
@@ -243,7 +243,7 @@ fn a_break_is_forgotten_and_a_boundary_is_not() {
 
 #[test]
 fn a_break_whose_cause_lasts_holds_the_gates() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let mut pwm = Pwm::new(bench.registers, [AdcCode(2_048); 3]);
     bench.fault = [true; 2];
     bench.settle();
@@ -259,7 +259,7 @@ fn a_break_whose_cause_lasts_holds_the_gates() {
 
 #[test]
 fn a_half_that_is_loaded_too_late_is_told() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let mut pwm = Pwm::new(bench.registers, [AdcCode(2_048); 3]);
     while !bench.tick() {}
     pwm.acknowledge();

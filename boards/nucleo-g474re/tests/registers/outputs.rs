@@ -1,7 +1,7 @@
 //! Every output that switches something on: off from reset on, in every refusal, halt and death.
 
 use crate::bench::Bench;
-use crate::plan;
+use crate::devices;
 use nucleo_g474re::pins::{Function, PINS, Pin};
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::start::{StartError, prepare, switch_off};
@@ -104,7 +104,7 @@ fn every_output_is_off_from_reset_to_the_end_of_the_start() {
     first_is_off(&bench.registers);
     bench.watch = first_is_off;
     let registers = bench.registers;
-    prepare(&registers, &mut bench, plan()).unwrap();
+    prepare(&registers, &mut bench, devices()).unwrap();
     first_is_off(&registers);
     let all = ["precharge relay", "main contactor", "discharge resistor", "braking chopper"];
     let commanded = command_all(&registers);
@@ -126,7 +126,7 @@ fn a_start_that_is_refused_leaves_every_output_off_whatever_is_commanded() {
         spoil(&mut bench);
         bench.watch = first_is_off;
         let registers = bench.registers;
-        assert_eq!(prepare(&registers, &mut bench, plan()), Err(error));
+        assert_eq!(prepare(&registers, &mut bench, devices()), Err(error));
         bench.settle();
         first_is_off(&registers);
         assert_eq!(command_all(&registers), NONE, "{error:?}");
@@ -142,7 +142,7 @@ fn a_start_that_is_refused_leaves_every_output_off_whatever_is_commanded() {
 
 #[test]
 fn a_death_switches_every_output_off() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let registers = bench.registers;
     let legs = registers.legs;
     legs.switch_on();
@@ -165,7 +165,7 @@ fn a_death_switches_every_output_off() {
 /// timers' debug mode). A contactor's pin has no timer: there the watchdog, which must not stop, resets the chip.
 #[test]
 fn a_halt_by_a_debugger_ends_with_every_output_off() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let frozen = registers.dbgmcu.apb2fzr().read();
     assert!(frozen.tim1() && frozen.tim8() && frozen.tim17() && frozen.tim20());
     assert!(!registers.dbgmcu.apb1lfzr().read().iwdg(), "a halted chip has no watchdog");
@@ -185,7 +185,7 @@ fn the_dead_battery_pull_downs_go_before_anything_else_and_in_a_refusal_too() {
         let mut bench = Bench::new();
         spoil(&mut bench);
         let registers = bench.registers;
-        assert_eq!(prepare(&registers, &mut bench, plan()), Err(error));
+        assert_eq!(prepare(&registers, &mut bench, devices()), Err(error));
         assert!(off(&registers), "{error:?}");
         let mut bench = Bench::of_other_inverter();
         spoil(&mut bench);

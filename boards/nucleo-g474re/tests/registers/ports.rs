@@ -1,7 +1,7 @@
 //! The board as the interrupts see it.
 
 use crate::bench::{Bench, control_update};
-use crate::plan;
+use crate::devices;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::legs::SoftwareBreak;
 use nucleo_g474re::position::{Encoder, Position, PositionState};
@@ -37,7 +37,7 @@ fn pass_index<P: Position>(control: &mut Control<P>, registers: &Registers) {
 /// The counts of the encoder after the trigger, while a more urgent interrupt runs, do not reach the angle.
 #[test]
 fn the_angle_is_that_of_the_trigger_however_late_it_is_read() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     registers.tim4.sr().write(|w| w.set_idxif(true));
     encoder.angle();
@@ -53,7 +53,7 @@ fn the_angle_is_that_of_the_trigger_however_late_it_is_read() {
 /// An index between the trigger and the reading: flag and count are not of one instant.
 #[test]
 fn an_index_just_after_the_trigger_makes_no_false_angle() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     let mut at = |captured: u16, index: bool| {
         registers.tim4.cnt().write(|w| w.set_cnt(captured));
@@ -82,7 +82,7 @@ fn an_angle_that_was_found_mends_at_the_index() {
     let machines =
         [(false, &BUILT_IN.ratings, 0), (true, &BUILT_IN.ratings, 0), (true, &RELUCTANCE, i32::MIN)];
     for (late, ratings, half) in machines {
-        let registers = Bench::started(plan()).registers;
+        let registers = Bench::started(devices()).registers;
         let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, ratings);
         let at = |encoder: &mut Encoder, captured: u16, index: bool| {
             registers.tim4.cnt().write(|w| w.set_cnt(captured));
@@ -114,7 +114,7 @@ fn an_angle_that_was_found_mends_at_the_index() {
 
 #[test]
 fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let registers = bench.registers;
     let state = PositionState::new();
     let mut control =
@@ -139,7 +139,7 @@ fn a_sample_has_currents_link_voltage_and_angle_in_si_units() {
 #[test]
 fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
     for (index, enable, trip) in [(false, true, false), (true, false, false), (true, true, true)] {
-        let mut bench = Bench::started(plan());
+        let mut bench = Bench::started(devices());
         let registers = bench.registers;
         let state = PositionState::new();
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
@@ -162,7 +162,7 @@ fn the_gates_wait_for_the_index_the_enable_input_and_quiet_break_inputs() {
 /// Square wave below 83 Hz has more than 1 ms between two carrier boundaries.
 #[test]
 fn a_late_conversion_is_thrown_away() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let registers = bench.registers;
     let mut pwm = Pwm::new(registers, [AdcCode(2_048); 3]);
     (bench.codes[4], bench.codes[7], bench.codes[14]) = (2_048 + 512, 2_048 - 256, 2_048 - 256);
@@ -178,7 +178,7 @@ fn a_late_conversion_is_thrown_away() {
 fn the_first_samples_are_right_however_long_the_start_takes() {
     let mut bench = Bench::new();
     let registers = bench.registers;
-    start::prepare(&registers, &mut bench, plan()).unwrap();
+    start::prepare(&registers, &mut bench, devices()).unwrap();
     bench.microseconds(50_000);
     start::run(&registers, &mut bench);
     bench.microseconds(100);
@@ -191,7 +191,7 @@ fn the_first_samples_are_right_however_long_the_start_takes() {
 
 #[test]
 fn a_converter_that_is_silent_gives_no_number() {
-    let bench = Bench::started(plan());
+    let bench = Bench::started(devices());
     let registers = bench.registers;
     // Acknowledged and nothing new.
     registers.adc2.isr().write(|_| ());
@@ -202,7 +202,7 @@ fn a_converter_that_is_silent_gives_no_number() {
 /// Flags are cleared by writing 0 and left alone by writing 1.
 #[test]
 fn the_control_interrupt_is_acknowledged_and_no_other_flag() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let state = PositionState::new();
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     registers.tim3.sr().write_value(SrGp16(0));
@@ -213,7 +213,7 @@ fn the_control_interrupt_is_acknowledged_and_no_other_flag() {
 /// Signals that the drive finds the angle by.
 #[test]
 fn the_drive_is_told_what_is_counted_and_tells_where_the_count_began() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let state = PositionState::new();
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
     let mut control = Control::new(registers, ZEROS, encoder, &state);
@@ -230,7 +230,7 @@ fn the_drive_is_told_what_is_counted_and_tells_where_the_count_began() {
 /// The same interrupt comes at boundaries, which it acknowledges, and in between for a revision.
 #[test]
 fn a_boundary_is_told_from_a_revision_and_acknowledged() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let mut pwm = Pwm::new(bench.registers, ZEROS);
     for _ in 0..3 {
         assert!(!pwm.is_boundary() && !pwm.begin());
@@ -242,7 +242,7 @@ fn a_boundary_is_told_from_a_revision_and_acknowledged() {
 
 #[test]
 fn an_overrun_is_counted_from_the_next_period() {
-    let bench = Bench::started(plan());
+    let bench = Bench::started(devices());
     let registers = bench.registers;
     let state = PositionState::new();
     let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
@@ -258,7 +258,7 @@ fn an_overrun_is_counted_from_the_next_period() {
 
 #[test]
 fn the_watchdog_is_fed_only_when_both_interrupts_ran() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     // SAFETY: KR is word 0 of the watchdog's block of memory.
     let fed = || unsafe { registers.iwdg.as_ptr().cast::<u32>().replace(0) == 0xAAAA };
     assert!(fed(), "at its start");
@@ -310,7 +310,7 @@ fn an_index_must_find_the_count_where_it_is_expected() {
         (3, 9, true),
         (20, 12, true),
     ] {
-        let registers = Bench::started(plan()).registers;
+        let registers = Bench::started(devices()).registers;
         let mut encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
         registers.tim4.sr().write(|_| ());
         assert_eq!(encoder.angle(), None, "no index yet");
@@ -360,7 +360,7 @@ fn what_holds_the_gates_has_a_name() {
         ),
     ];
     for (what, spoil, ready, fault) in cases {
-        let bench = Bench::started(plan());
+        let bench = Bench::started(devices());
         let registers = bench.registers;
         let state = PositionState::new();
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);

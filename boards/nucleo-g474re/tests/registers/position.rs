@@ -1,7 +1,7 @@
 //! The position sensors that take the encoder's place: what they configure, and the angles that they read.
 
 use crate::bench::Bench;
-use crate::plan;
+use crate::devices;
 use crate::ports::write_input;
 use nucleo_g474re::Control;
 use nucleo_g474re::built_in::traction::BUILT_IN;
@@ -20,7 +20,7 @@ type Ssi = Absolute<13, true>;
 type Wound = Resolver<3, 1_241, 850>;
 
 fn prepared<P: Position>() -> (Bench, P) {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let registers = bench.registers;
     P::prepare(&registers, &POWER_STAGE, &mut bench).unwrap();
     P::follow(&registers, &mut bench);
@@ -68,7 +68,7 @@ fn an_absolute_angle_is_that_of_the_frame_before() {
 /// From 0 to one less than there are in a turn, at every edge of both tracks; the index sets it to 0.
 #[test]
 fn an_encoders_timer_counts_a_turn() {
-    let timer = Bench::started(plan()).registers.tim4;
+    let timer = Bench::started(devices()).registers.tim4;
     assert_eq!(u32::from(timer.arr().read().arr()) + 1, POWER_STAGE.encoder_counts);
     assert_eq!(timer.smcr().read().sms(), Sms::ENCODER_MODE_3);
     assert!(timer.ecr().read().ie() && timer.cr1().read().cen());

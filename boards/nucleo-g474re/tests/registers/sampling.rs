@@ -1,7 +1,7 @@
 //! The converters: their clock, the means that are their zeros, and where these are kept.
 
 use crate::bench::Bench;
-use crate::plan;
+use crate::devices;
 use nucleo_g474re::position::{Position, Resolver};
 use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use nucleo_g474re::sampling::KeptZeros;
@@ -31,7 +31,7 @@ impl Wait for Rippling<'_> {
 
 #[test]
 fn a_zero_is_the_nearest_code_to_the_mean() {
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let sampler = control_sampler(&bench.registers);
     let zeros = sampler.zeros(&POWER_STAGE, &mut Rippling { bench: &mut bench, conversions: 0 });
     // A quarter, a half and all of the conversions are one code higher.
@@ -51,7 +51,7 @@ fn zeros_are_kept_for_an_interrupt_that_begins_with_them() {
 #[test]
 fn the_converters_have_a_quarter_of_the_cores_clock() {
     let quartered = |converters: AdcCommon| converters.ccr().read().ckmode() == Ckmode::SYNC_DIV4;
-    let mut bench = Bench::started(plan());
+    let mut bench = Bench::started(devices());
     let registers = bench.registers;
     assert!(quartered(registers.adc12));
     assert!(!quartered(registers.adc345), "nobody has them");

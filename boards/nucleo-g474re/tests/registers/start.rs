@@ -1,12 +1,13 @@
 //! The start: its order, what it writes, what it refuses.
 
 use crate::bench::{Bench, PWR_CR5_AFTER_RESET};
-use crate::plan;
+use crate::devices;
 use nucleo_g474re::pins::PINS;
 use nucleo_g474re::registers::Registers;
-use nucleo_g474re::start::{Found, Plan, STEPS, Start, StartError, prepare, run};
+use nucleo_g474re::start::{Found, STEPS, Start, StartError, prepare, run};
 use nucleo_g474re::{CLOCK, PRESCALER, power_stage::POWER_STAGE};
 use stm32_metapac::{adc, gpio, rcc, timer};
+use tractive::modulation::SwitchLimits;
 
 /// Nothing drives a gate high: the outputs are off, driven low where a timer has the pin, and nothing counts.
 fn gates_are_off(registers: &Registers) {
@@ -44,7 +45,7 @@ fn the_gates_are_off_until_everything_is_configured() {
         registers: &registers,
         wait: &mut bench,
         stage: &POWER_STAGE,
-        plan: plan(),
+        devices: devices(),
         found: Found::default(),
     };
     for (name, step) in STEPS {
@@ -68,7 +69,7 @@ fn the_gates_are_off_until_everything_is_configured() {
 
 #[test]
 fn the_pwm_timers_are_shadowed_dead_timed_and_breakable() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     for timer in [registers.legs.tim1, registers.legs.tim8] {
         let control = timer.cr1().read();
         assert!(control.arpe() && !control.udis());
@@ -98,7 +99,7 @@ fn the_pwm_timers_are_shadowed_dead_timed_and_breakable() {
         }
     }
     let tim1 = registers.legs.tim1;
-    assert_eq!(u32::from(tim1.arr().read().arr()), plan().shortest_half_ticks - 1);
+    assert_eq!(u32::from(tim1.arr().read().arr()), devices().shortest_half_ticks - 1);
     assert_eq!(tim1.cr2().read().mms(), timer::vals::Mms::UPDATE);
     assert_eq!(tim1.cr2().read().mms2(), timer::vals::Mms2::UPDATE);
     assert_eq!(tim1.rcr().read().rep(), 0);
@@ -107,7 +108,7 @@ fn the_pwm_timers_are_shadowed_dead_timed_and_breakable() {
 
 #[test]
 fn the_control_timer_has_its_period_and_triggers_its_converter() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let tim3 = registers.tim3;
     let cycles = (u32::from(tim3.psc().read()) + 1) * (u32::from(tim3.arr().read().arr()) + 1);
     assert_eq!(cycles, 17_000, "10 kHz of 170 MHz");
@@ -129,17 +130,17 @@ fn the_control_timer_has_its_period_and_triggers_its_converter() {
 /// held for long by a processor that stands.
 #[test]
 fn the_watchdog_bites_after_twenty_milliseconds() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let divider = 4 << registers.iwdg.pr().read().pr().to_bits();
     let counts = f64::from(registers.iwdg.rlr().read().rl());
     let bites_s = counts * f64::from(divider) / 32_000.0;
-    let slowest_half_s = f64::from(plan().shortest_half_ticks) * f64::from(CLOCK.tick_s);
+    let slowest_half_s = f64::from(devices().shortest_half_ticks) * f64::from(CLOCK.tick_s);
     assert!(bites_s > 10.0 * slowest_half_s && bites_s <= 0.021, "{bites_s} s, halves of {slowest_half_s} s");
 }
 
 #[test]
 fn the_clock_tree_is_170_mhz() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let pll = registers.rcc.pllcfgr().read();
     assert_eq!(pll.pllsrc(), rcc::vals::Pllsrc::HSE);
     let divider = u32::from(pll.pllm().to_bits()) + 1;
@@ -160,7 +161,7 @@ fn the_clock_tree_is_170_mhz() {
 
 #[test]
 fn each_comparator_watches_one_sign_of_one_current() {
-    let registers = Bench::started(plan()).registers;
+    let registers = Bench::started(devices()).registers;
     let (low, high) = POWER_STAGE.break_codes();
     // Inverting inputs by the reference manual: (number, converter's channel).
     let threshold = |number: usize| match number {
@@ -193,10 +194,10 @@ fn what_is_not_in_order_is_told_and_leaves_the_gates_off() {
         let mut bench = Bench::new();
         spoil(&mut bench);
         let registers = bench.registers;
-        assert_eq!(prepare(&registers, &mut bench, plan()), Err(error));
+        assert_eq!(prepare(&registers, &mut bench, devices()), Err(error));
         gates_are_off(&registers);
     }
-    let too_long = Plan { shortest_half_ticks: 16_384 };
+    let too_long = SwitchLimits { shortest_half_ticks: 16_384, ..devices() };
     let mut bench = Bench::new();
     let registers = bench.registers;
     let error = StartError::Carrier { longest_ticks: 65_536 };
@@ -212,7 +213,7 @@ fn a_gate_driver_may_be_late() {
         bench.quiet_from_ns = quiet_ms.map(|ms: u64| ms * 1_000_000);
         bench.watch = gates_are_off;
         let registers = bench.registers;
-        prepare(&registers, &mut bench, plan()).unwrap();
+        prepare(&registers, &mut bench, devices()).unwrap();
         run(&registers, &mut bench);
         bench.settle();
         assert_eq!(registers.legs.is_tripped(), tripped, "{quiet_ms:?}");
@@ -233,7 +234,7 @@ fn a_refusal_can_be_told_over_the_bus() {
     let mut bench = Bench::new();
     let registers = bench.registers;
     registers.rcc.csr().write(|w| w.set_iwdgrstf(true));
-    assert_eq!(prepare(&registers, &mut bench, plan()), Err(StartError::WatchdogReset));
+    assert_eq!(prepare(&registers, &mut bench, devices()), Err(StartError::WatchdogReset));
     assert!(registers.rcc.cr().read().hseon(), "the bus's clock");
     assert!(registers.rcc.ahb2enr().read().gpioaen(), "its pins'");
 }
@@ -254,7 +255,7 @@ fn a_peripheral_is_written_to_only_after_its_clock_has_come() {
             system || (registers.rcc.apb2enr().read().syscfgen() && registers.syscfg.cfgr2().read().0 == 0),
         ]);
     };
-    prepare(&registers, &mut bench, plan()).unwrap();
+    prepare(&registers, &mut bench, devices()).unwrap();
     assert_eq!(SEEN.get(), [true; 2], "a wait between clock and first write, of PWR and SYSCFG");
 }
 
@@ -264,7 +265,7 @@ fn the_zeros_are_means_of_what_each_converter_sees() {
     (bench.codes[2], bench.codes[15], bench.codes[5]) = (2_040, 2_050, 2_100);
     (bench.codes[4], bench.codes[7], bench.codes[14]) = (2_041, 2_051, 2_101);
     let registers = bench.registers;
-    let found = prepare(&registers, &mut bench, plan()).unwrap();
+    let found = prepare(&registers, &mut bench, devices()).unwrap();
     assert_eq!(found.control_zeros.map(|zero| zero.0), [2_040, 2_050, 2_100]);
     assert_eq!(found.pwm_zeros.map(|zero| zero.0), [2_041, 2_051, 2_101]);
 }

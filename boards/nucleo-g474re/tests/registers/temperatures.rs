@@ -1,7 +1,7 @@
 //! The temperature sensors' conversions: in turn, on their own channels, beside the control interrupt's.
 
 use crate::bench::Bench;
-use crate::plan;
+use crate::devices;
 use nucleo_g474re::pins::PINS;
 use nucleo_g474re::temperatures::{CHANNELS, TemperatureInputs};
 use stm32_metapac::adc::vals::SampleTime;
@@ -20,7 +20,7 @@ pub fn done(adc: Adc, code: u16) {
 
 #[test]
 fn each_slot_reads_one_sensor_and_asks_for_the_other() {
-    let adc = Bench::started(plan()).registers.adc1;
+    let adc = Bench::started(devices()).registers.adc1;
     let before = adc.jsqr().read();
     let mut inputs = TemperatureInputs::default();
     let mut asked = Vec::new();
@@ -45,7 +45,7 @@ fn each_slot_reads_one_sensor_and_asks_for_the_other() {
 
 #[test]
 fn the_channels_are_those_of_the_pins_and_have_time_to_settle() {
-    let adc = Bench::started(plan()).registers.adc1;
+    let adc = Bench::started(devices()).registers.adc1;
     for (channel, purpose) in CHANNELS.into_iter().zip(["winding's", "heat sink's"]) {
         let signal = format!("ADC1_IN{channel}");
         let pin = PINS.iter().find(|pin| pin.signals == [signal.as_str()]).unwrap();
