@@ -104,7 +104,7 @@ fn try_tables(good: &'static Tables, check: impl Fn(&Tables) -> Result<(), Refus
     let ratings = fields!(Ratings as Ratings {
         pole_pairs, stator_resistance_ohm, max_torque_nm, max_power_w, max_current_a, min_id_a, max_speed_rad_s, magnet_flux_wb,
         dc_link_min_v, dc_link_nominal_v, dc_link_max_v, max_switching_hz, trip_current_a, trip_dc_over_v,
-        trip_dc_under_v, trip_speed_rad_s, torque_slew_nm_s, iron_share | iron
+        trip_dc_under_v, trip_speed_rad_s, torque_slew_nm_s, max_acceleration_rad_s2, iron_share | iron
     }: f32);
     try_all(*good, "ratings.", ratings, |tables| &mut tables.ratings, check);
     let iron = fields!(IronLoss as IronLoss { hysteresis, eddy | }: f32);

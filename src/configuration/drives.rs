@@ -1,9 +1,9 @@
 //! Settings of the two systems.
 
-use crate::control::{SpeedDesign, ZSourceDesign, ZSourceGains};
+use crate::control::{SpeedDesign, SpeedTracker, ZSourceDesign, ZSourceGains};
 use crate::drive::{dual, traction};
 use crate::machine::{Ratings, Tables};
-use crate::protection::LinkLimits;
+use crate::protection::{INNOVATION_RAD, LinkLimits};
 use tractive_control::checked;
 use tractive_control::configuration::{ABOVE_ZERO, Bound, ROUNDING, Refused, within};
 
@@ -14,6 +14,8 @@ const MOST_CARRIERS: f32 = 8.0;
 /// The longest carrier period, in ticks: sixteen bits hold a half of it in compare steps.
 const LONGEST_CARRIER: f32 = 4_000.0;
 
+/// Largest lag of the followed angle behind a rotor that accelerates by itself, in rad: what is left of the check's bound is for the sensor.
+const LARGEST_LAG_RAD: f32 = 0.8 * INNOVATION_RAD;
 /// The oldest angle that can be brought up to date, in s.
 pub const LATEST_ANGLE_S: f32 = 0.5e-3;
 /// Largest step of a counted angle, in rad: twice what counts as an angle that is lost.
@@ -30,7 +32,10 @@ impl traction::Settings {
     /// The first scalar that makes no sense, of the machine or of the settings.
     pub const fn check(&self, tables: &Tables) -> Result<(), Refused> {
         checked!(tables.check());
-        self.check_settings()
+        checked!(self.check_settings());
+        let most = SpeedTracker::most_acceleration_rad_s2(LARGEST_LAG_RAD, self.clock.control_s());
+        let fastest = tables.ratings.max_acceleration_rad_s2;
+        within(&[Bound("ratings.max_acceleration_rad_s2", fastest, ABOVE_ZERO, most)])
     }
 
     /// The same for a machine that is checked already.
@@ -80,6 +85,9 @@ impl dual::Settings {
         checked!(self.check_carrier());
         checked!(gains.check());
         checked!(check_speed(speed, clock.control_s(), &tables.ratings));
+        let fastest = tables.ratings.max_acceleration_rad_s2;
+        let most = dual::MOST_ACCELERATION_RAD_S2;
+        checked!(within(&[Bound("ratings.max_acceleration_rad_s2", fastest, ABOVE_ZERO, most)]));
         checked!(check_link(link, clock.control_s()));
         checked!(check_link_gains(link_gains, link));
         check_limits(limits)

@@ -6,7 +6,7 @@ use crate::frames::Abc;
 use crate::machine::Ratings;
 
 /// The largest error of an angle against the speed's prediction, in electrical rad. The tracker's lag behind a rotor that
-/// accelerates by itself is a fifth of it.
+/// accelerates by itself is a quarter of it, of the lightest rotors up to four fifths.
 pub const INNOVATION_RAD: f32 = 0.05;
 
 /// The angle, `innovation_rad` off what was expected.

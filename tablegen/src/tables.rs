@@ -263,6 +263,8 @@ fn ratings(parameters: &Parameters, magnet_flux_wb: f64) -> Ratings {
         trip_dc_under_v: parameters.trip_dc_under_v as f32,
         trip_speed_rad_s: (parameters.trip_speed_rpm * rad_s) as f32,
         torque_slew_nm_s: parameters.torque_slew_nm_per_s as f32,
+        max_acceleration_rad_s2: (f64::from(parameters.pole_pairs) * parameters.max_torque_nm
+            / parameters.rotor_inertia_kg_m2) as f32,
         iron: IronLoss::NONE,
         iron_share: parameters.iron_loss_share as f32,
     }

@@ -38,6 +38,7 @@ impl Ratings {
             trip_dc_under_v,
             trip_speed_rad_s,
             torque_slew_nm_s,
+            max_acceleration_rad_s2,
             iron: _,
             iron_share,
         } = *self;
@@ -59,6 +60,7 @@ impl Ratings {
             Bound("ratings.trip_dc_under_v", trip_dc_under_v, 0.0, 1e6),
             Bound("ratings.trip_speed_rad_s", trip_speed_rad_s, ABOVE_ZERO, 1.1e6),
             Bound("ratings.torque_slew_nm_s", torque_slew_nm_s, ABOVE_ZERO, 1e9),
+            Bound("ratings.max_acceleration_rad_s2", max_acceleration_rad_s2, ABOVE_ZERO, 1e9),
             Bound("ratings.iron_share", iron_share, 0.0, 1.0),
         ]));
         self.check_together()

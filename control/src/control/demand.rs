@@ -183,6 +183,7 @@ mod tests {
             trip_dc_under_v: 900.0,
             trip_speed_rad_s: 2_700.0,
             torque_slew_nm_s: 8_000.0,
+            max_acceleration_rad_s2: 2_500.0,
             iron: IronLoss::NONE,
             iron_share: 0.0,
         };

@@ -1,9 +1,12 @@
 //! Speed from the angle: a second-order tracking loop.
 
-use crate::frames::Angle;
+use crate::frames::{Angle, sqrt};
 
 /// Natural frequency of the loop unless another is wanted, in rad/s; critically damped.
 const NATURAL_RAD_S: f32 = 500.0;
+/// Lag behind the machine's largest acceleration, in rad, that a natural frequency is wanted for; the largest, over the sampling rate.
+const LAG_RAD: f32 = 0.0125;
+const SAMPLED: f32 = 0.25;
 /// Control periods until the estimate is used.
 const SETTLING_STEPS: u32 = 200;
 
@@ -36,6 +39,21 @@ impl SpeedTracker {
     /// With another natural frequency, in rad/s; well below the sampling rate.
     pub const fn with_natural(natural_rad_s: f32) -> Self {
         Self { angle: Angle::ZERO, omega: 0.0, ahead_rad: 0.0, steps: 0, natural_rad_s, lost: false }
+    }
+
+    /// Follows a rotor of this largest acceleration, in rad/s²: no slower than before.
+    pub fn quicken(&mut self, acceleration_rad_s2: f32, period_s: f32) {
+        let (wanted, most) = (sqrt(acceleration_rad_s2 * (1.0 / LAG_RAD)), SAMPLED / period_s);
+        let natural = if wanted < most { wanted } else { most };
+        if natural > self.natural_rad_s {
+            self.natural_rad_s = natural;
+        }
+    }
+
+    /// Largest acceleration, in rad/s², that the loop can follow with this lag, in rad, where it samples so often.
+    pub const fn most_acceleration_rad_s2(lag_rad: f32, period_s: f32) -> f32 {
+        let most = SAMPLED / period_s;
+        lag_rad * most * most
     }
 
     /// The angle that the next sample should show.
@@ -133,6 +151,26 @@ mod tests {
             let [behind, left] =
                 [tracker.omega(), tracker.leading()].map(|seen| (speed - seen) / acceleration);
             assert!((behind - 4e-3).abs() < 1e-4 && left.abs() < 1e-4, "{behind} {left}");
+        }
+    }
+
+    /// Rotors from a heavy one to the lightest that a loop of 10 kHz follows: the angle is behind by as much as is wanted, at most by four times that.
+    #[test]
+    fn a_light_rotor_is_followed_more_quickly() {
+        let period_s = 1e-4;
+        for (acceleration, lag_rad) in [(2_500.0, 0.01), (25e3, LAG_RAD), (250e3, 0.04)] {
+            let (mut tracker, mut angle, mut omega) = (SpeedTracker::new(), Angle::ZERO, 0.0_f32);
+            tracker.quicken(acceleration, period_s);
+            let mut ahead_rad = 0.0;
+            for _ in 0..400 {
+                ahead_rad = (angle - tracker.predicted(period_s)).signed_radians();
+                tracker.step(angle, period_s);
+                angle = angle + Angle::within_half_turn((omega + 0.5 * acceleration * period_s) * period_s);
+                omega += acceleration * period_s;
+            }
+            assert!((ahead_rad / lag_rad - 1.0).abs() < 0.05, "{acceleration}: {ahead_rad}");
+            let most = SpeedTracker::most_acceleration_rad_s2(lag_rad, period_s);
+            assert!(acceleration < 1.001 * most, "{acceleration} {most}");
         }
     }
 }

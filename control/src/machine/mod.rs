@@ -52,6 +52,8 @@ pub struct Ratings {
     pub trip_speed_rad_s: f32,
     /// Slew rate of the torque demand, in N·m/s.
     pub torque_slew_nm_s: f32,
+    /// Largest acceleration of the rotor, electrical, in rad/s²: that of the largest torque on its inertia.
+    pub max_acceleration_rad_s2: f32,
     /// Iron loss, were all of the loss that the folder names the iron's.
     pub iron: IronLoss,
     /// The iron's share of that loss, 0 ..= 1, as far as it is known.

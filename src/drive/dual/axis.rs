@@ -17,6 +17,8 @@ pub use crate::protection::INNOVATION_RAD;
 /// sensor that begins to count the other way is found where it is too slow for an innovation.
 const SLOW_S: f32 = 5e-3;
 const ASTRAY_RAD: f32 = 0.25;
+/// Largest acceleration of a rotor that is not taken for such a sensor, electrical, in rad/s².
+pub const MOST_ACCELERATION_RAD_S2: f32 = 0.8 * ASTRAY_RAD / (SLOW_S * SLOW_S);
 /// The voltage that the loop may ask for, as a share of the largest one that is to be had at every angle. The modulator gives what its
 /// hexagon has at the angle, up to 1.155, and tells.
 const LOOP_SHARE: f32 = 1.15;

@@ -31,7 +31,7 @@ use crate::recorder::DualRecorder;
 use crate::time::Clock;
 use core::sync::atomic::AtomicU32;
 
-pub use axis::TRACKING_RAD_S;
+pub use axis::{MOST_ACCELERATION_RAD_S2, TRACKING_RAD_S};
 pub use control::ControlTask;
 pub use messages::{DualApplied, DualCommand, MotorCommand, MotorShare};
 pub use pwm::PwmTask;

@@ -24,7 +24,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
         let lost = match followed {
             Some(_) if self.controller.speed_is_known() => protection::check_angle(self.innovation_rad),
-            Some(_) => None,
+            Some(_) => {
+                let fastest = self.machine.tables().ratings.max_acceleration_rad_s2;
+                self.controller.tracker_mut().quicken(fastest, clock.control_s());
+                None
+            }
             None => {
                 let needed = self.controller.is_following() || (enable && port.turned().is_none());
                 protection::check_known(needed)
