@@ -9,6 +9,7 @@ use tractive::modulation::{CarrierHalf, Mode, SwitchLimits, index_limit};
 use tractive::ports::{ControlPort, DriveCommand, PwmPort, Report, Sample};
 use tractive::protection::{Fault, MaskedFaults, SafeState, Trip};
 use tractive::recorder::{Record, Recorder};
+use tractive::start_up::PULSE_SHARE;
 use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
@@ -264,13 +265,15 @@ fn a_link_that_swings_is_damped_by_torque_where_it_is_wanted() {
 #[test]
 fn pulses_of_the_start_keep_within_the_largest_voltage_of_a_carrier() {
     let quick = settings(9_000.0);
-    for (udc_v, commands) in [(900.0, 2.0), (1_200.0, 2.0), (1_380.0, 2.0), (1_400.0, 1.0), (1_500.0, 1.0)] {
+    let at = |id_a: f32| BUILT_IN.flux.at(id_a, 0.0)[0];
+    let pulse_wb = at(0.0) - at(-PULSE_SHARE * BUILT_IN.ratings.max_current_a);
+    for (udc_v, commands) in [(900.0, 2.0), (1_200.0, 2.0), (1_250.0, 2.0), (1_280.0, 1.0), (1_500.0, 1.0)] {
         let counts = |_: u32, sample: &mut Sample, _: &mut DriveCommand| {
             (sample.angle, sample.udc_v) = (None, udc_v);
         };
         let mut motor = Motor::new(0.0, &counts);
         motor.runs(quick, 2 * SETTLED);
-        let pulse_v = 0.17 * BUILT_IN.ratings.magnet_flux_wb / CLOCK.control_s() / commands;
+        let pulse_v = pulse_wb / CLOCK.control_s() / commands;
         let limit_v = 0.95 * index_limit(Mode::Async, 0.0, &quick.devices) * six_step_v(udc_v);
         let within = pulse_v - 0.1..limit_v + 0.1;
         assert!(within.contains(&motor.largest_v), "{udc_v} V: {} V, not {within:?}", motor.largest_v);

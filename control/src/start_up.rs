@@ -6,7 +6,8 @@
 //!    With `i = A ψ + B ψ*` as complex numbers, the sum of `Δi Δψ` over all directions keeps `B`, whose angle is twice that of the d axis,
 //!    along which the inductance is least, and of `A` what pulses of unequal length leave. Dead time, offsets and saturation fall out of the sum, or do not turn it.
 //! 3. **Polarity**: magnets saturate the iron along +d, so that a pulse there takes more current than one along −d. Over all directions the currents
-//!    of the pulses add up to nothing but that. A machine without magnets has none to be found.
+//!    of the pulses add up to nothing but that. A machine without magnets has none to be found. Where the map says that the iron saturates along −d,
+//!    as the bridges of some reluctance machines do, the currents are not believed.
 //! 4. **Push**: a machine whose currents do not show it shows its polarity by turning: a current along q moves the rotor by half a degree or so,
 //!    and the opposite current stops it again; so do shorter ones what drift is left.
 //!
@@ -25,8 +26,8 @@ const TURNED: Angle = Angle(35_791_394);
 /// Turn that shows which way a push goes: 2°.
 const PUSHED: Angle = Angle(23_860_929);
 
-/// Flux linkage of a pulse, as a share of the magnets'; without magnets that of a current along d, as a share of the largest.
-pub const PULSE_SHARE: f32 = 0.17;
+/// Current along −d whose flux linkage a pulse has, as a share of the largest.
+pub const PULSE_SHARE: f32 = 0.3;
 /// Commands without voltage before the first pulse.
 const LEAD: u32 = 4;
 /// Pulses of the rounds, in twelve directions each.
@@ -40,6 +41,8 @@ const PUSH_S: f32 = 0.5;
 const REST: u32 = 20;
 /// Share of the way to a push's current that a command goes, by the mean of both axes' inverse inductances.
 const LEAD_SHARE: f32 = 0.2;
+/// Share of a drift that a mend takes away: a push's current lags, so that it would be up to twice the drift.
+const MEND_SHARE: f32 = 0.7;
 /// Most rounds in which what drift is left is taken away.
 const MENDS: u32 = 4;
 
@@ -47,6 +50,8 @@ const MENDS: u32 = 4;
 const SALIENT: f32 = 0.03;
 /// Share of the currents' way along the pulses that shows the polarity.
 const POLAR_SHARE: f32 = 0.02;
+/// Share by which the map's iron may saturate along −d more than along +d.
+const BENT_SHARE: f32 = 0.02;
 
 /// Everything that a command is made of.
 #[derive(Clone, Copy, Debug)]
@@ -213,7 +218,7 @@ impl StartUp {
             (self.commands, self.pulses) = (0, self.pulses + 1);
             self.pushed_from = input.turned;
             if self.pulses == PULSES
-                && let Some(ends) = self.judge(input.tables.ratings.has_magnets())
+                && let Some(ends) = self.judge(input.tables)
             {
                 return ends;
             }
@@ -238,7 +243,7 @@ impl StartUp {
     }
 
     /// The axis, and the polarity of its magnets if the currents show it.
-    fn judge(&mut self, has_magnets: bool) -> Option<StartUpStep> {
+    fn judge(&mut self, tables: &Tables) -> Option<StartUpStep> {
         let per = 1.0 / self.squared;
         let (salient, uneven, round) = (self.salient * per, self.uneven * per, self.round * per);
         // `A` and `B`, from the sums of `Δi Δψ* = A Δψ Δψ* + B Δψ* Δψ*`, of which `round` is the real part, and of `Δi Δψ = A Δψ Δψ + B Δψ* Δψ`.
@@ -250,7 +255,7 @@ impl StartUp {
             return Some(StartUpStep::Failed);
         }
         self.axis = Angle((b.angle().signed() >> 1) as u32);
-        if !has_magnets {
+        if !tables.ratings.has_magnets() {
             return Some(self.found(false));
         }
         // Less what pulses that are longer one way than the other leave by themselves.
@@ -259,7 +264,7 @@ impl StartUp {
         let polar_a = polar.park(self.axis.sin_cos()).d;
         // The currents' way is the sum of `Δi·Δψ` over the flux linkages' mean.
         let way = POLAR_SHARE * self.round;
-        if polar_a * polar_a * self.squared > way * way * self.count {
+        if polar_a * polar_a * self.squared > way * way * self.count && !saturates_backward(tables) {
             return Some(self.found(polar_a < 0.0));
         }
         self.begin(Stage::Push);
@@ -284,7 +289,7 @@ impl StartUp {
             Stage::Drift if self.commands == REST => self.pushed_from = input.turned,
             Stage::Drift if self.commands >= REST + self.pushes => {
                 // The push gave twice its mean speed, and took as long.
-                let share = off(moved) as f32 * (0.5 / PUSHED.0 as f32);
+                let share = off(moved) as f32 * (0.5 * MEND_SHARE / PUSHED.0 as f32);
                 self.drifts_on = (moved.signed() < 0) == self.against;
                 self.mend = (self.pushes as f32 * share) as u32;
                 if self.mend == 0 || self.mends == MENDS {
@@ -327,15 +332,22 @@ pub const fn axis_error(ratings: &Ratings, error: Angle) -> Angle {
     if ratings.has_magnets() { error } else { Angle(((error.0 << 1) as i32 >> 1) as u32) }
 }
 
+/// By how much the pulses' current along −d takes the flux linkage down, and along +d up, in Wb.
+fn along_d_wb(tables: &Tables) -> (f32, f32) {
+    let current_a = PULSE_SHARE * tables.ratings.max_current_a;
+    let at = |id_a: f32| tables.flux.at(id_a, 0.0)[0];
+    (at(0.0) - at(-current_a), at(current_a) - at(0.0))
+}
+
+/// `true` of a map whose iron saturates along −d rather than +d.
+fn saturates_backward(tables: &Tables) -> bool {
+    let (down_wb, up_wb) = along_d_wb(tables);
+    up_wb > (1.0 + BENT_SHARE) * down_wb
+}
+
 /// Commands that build a pulse up, and its flux linkage in Wb.
 fn pulse(input: &StartUpInput) -> (u32, f32) {
-    let ratings = &input.tables.ratings;
-    let pulse_wb = if ratings.has_magnets() {
-        PULSE_SHARE * ratings.magnet_flux_wb
-    } else {
-        let at = |id_a: f32| input.tables.flux.at(id_a, 0.0)[0];
-        at(0.0) - at(-PULSE_SHARE * ratings.max_current_a)
-    };
+    let (pulse_wb, _) = along_d_wb(input.tables);
     let most_wb = input.limit_v * input.interval_s;
     let share = pulse_wb / most_wb;
     if share < LONGEST { (share as u32 + 1, pulse_wb) } else { (LONGEST as u32, LONGEST * most_wb) }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::OnceLock;
 use tractive_control::frames::{AlphaBeta, Angle, Dq};
-use tractive_control::machine::{Ratings, Tables};
+use tractive_control::machine::{Grid, Ratings, Tables};
 use tractive_control::start_up::{PULSE_SHARE, StartUp, StartUpInput, StartUpStep, axis_error};
 use tractive_tablegen::MachineFolder;
 
@@ -48,7 +48,7 @@ fn answer(rotor: &Rotor, tables: &Tables, alike: usize) -> (StartUpStep, f32, bo
     for command in 0..10_000 {
         let input = StartUpInput {
             turned: Angle::ZERO,
-            limit_v: 800.0,
+            limit_v: 1_600.0,
             interval_s: 1.5 * HALF_S,
             committed: AlphaBeta::default(),
             tables,
@@ -83,6 +83,12 @@ fn rotors(inductance_h: Dq, bend: f32) -> impl Iterator<Item = Rotor> {
     })
 }
 
+/// Flux linkage of a pulse, in Wb.
+fn pulse_wb(tables: &Tables) -> f32 {
+    let at = |id_a: f32| tables.flux.at(id_a, 0.0)[0];
+    at(0.0) - at(-PULSE_SHARE * tables.ratings.max_current_a)
+}
+
 /// Each command makes up for what the halves before it have made of theirs: no pulse is longer than the longest command makes one, and saturation shows the poles.
 #[test]
 fn saturation_shows_the_poles_though_pulses_are_of_unequal_length() {
@@ -90,8 +96,30 @@ fn saturation_shows_the_poles_though_pulses_are_of_unequal_length() {
     for (rotor, alike) in rotors(SALIENT, 2.0).flat_map(|rotor| EVERY.map(|alike| (rotor, alike))) {
         let (step, largest_wb, _) = answer(&rotor, &tables, alike);
         assert!(off_deg(step, &rotor).abs() < 1.0, "{step:?}");
-        let pulse_wb = PULSE_SHARE * tables.ratings.magnet_flux_wb;
+        let pulse_wb = pulse_wb(&tables);
         assert!((1.2..1.7).contains(&(largest_wb / pulse_wb)), "{}", largest_wb / pulse_wb);
+    }
+}
+
+/// Iron that the map knows to saturate along −d takes the poles' place: they are not believed, and a rotor that does not move has failed.
+#[test]
+fn poles_are_not_believed_where_the_map_saturates_the_other_way() {
+    let tables = tables(true);
+    // The map goes on straight along +d, so that what is added along −d alone is missing there.
+    let bent: Vec<[f32; 2]> = {
+        let Grid { rows, columns, first_row, inverse_row_step, nodes, .. } = tables.flux;
+        let id_a = |row: usize| first_row + row as f32 / inverse_row_step;
+        let node = |place: usize| {
+            let [psi_d, psi_q] = nodes[place];
+            let beyond_a = -id_a(place / columns).min(0.0);
+            [psi_d + 4e-6 * beyond_a * beyond_a, psi_q]
+        };
+        (0..rows * columns).map(node).collect()
+    };
+    let bent = Tables { flux: Grid { nodes: bent.leak(), ..tables.flux }, ..tables };
+    for (rotor, alike) in rotors(SALIENT, 2.0).flat_map(|rotor| EVERY.map(|alike| (rotor, alike))) {
+        let (step, _, pushed) = answer(&rotor, &bent, alike);
+        assert_eq!((step, pushed), (StartUpStep::Failed, true), "{alike}");
     }
 }
 
@@ -114,8 +142,7 @@ fn a_machine_of_reluctance_alone_is_found_but_for_half_a_turn() {
         let StartUpStep::Found(found) = step else { panic!("{step:?}") };
         let error = axis_error(&tables.ratings, found - rotor.at);
         assert!(error.signed_radians().to_degrees().abs() < 0.1, "{error:?}");
-        let at = |id_a: f32| tables.flux.at(id_a, 0.0)[0];
-        let pulse_wb = at(0.0) - at(-PULSE_SHARE * tables.ratings.max_current_a);
+        let pulse_wb = pulse_wb(&tables);
         assert!((1.2..1.7).contains(&(largest_wb / pulse_wb)), "{}", largest_wb / pulse_wb);
     }
 }

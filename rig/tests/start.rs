@@ -6,6 +6,7 @@ use nameplate::made;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
+use tempfile::TempDir;
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::{Recorded, Recording};
 
@@ -73,27 +74,46 @@ fn a_rotor_that_is_braked_shows_its_polarity_by_saturation_or_not_at_all() {
 
 /// Machines of a nameplate: carriers of one or two halves for a command, which makes pulses of unequal lengths; the first three then took the wrong pole, or an axis
 /// that was up to 15° off. One whose map ends along +d where its pulses begin to saturate it; and two of reluctance alone, which have no poles.
-const NAMEPLATES: [&str; 6] = [
+const NAMEPLATES: [&str; 8] = [
     "--pole-pairs 5 --rs 0.0226 --max-current 120 --udc 750 --max-speed-rpm 7402 --max-switching-hz 16000 --ld 0.000316 --lq 0.00156 --psi-f 0.0491 --saturation 0.5",
     "--pole-pairs 10 --rs 0.0126 --max-current 65.1 --udc 24 --max-speed-rpm 4597 --max-switching-hz 8000 --ld 0.0000296 --lq 0.000081 --psi-f 0.0018 --saturation 0.6",
     "--pole-pairs 4 --rs 0.00638 --max-current 200 --udc 48 --max-speed-rpm 20202 --max-switching-hz 16000 --ld 0.0000294 --lq 0.000043 --psi-f 0.00513 --saturation 0.8",
     "--pole-pairs 10 --rs 0.174 --max-current 80 --udc 750 --max-speed-rpm 820 --max-switching-hz 16000 --ld 0.00417 --lq 0.0199 --psi-f 0.437 --saturation 0.4",
     "--pole-pairs 2 --rs 0.00355 --max-current 200 --udc 24 --max-speed-rpm 2630 --max-switching-hz 8000 --ld 0.0000608 --lq 0.000312 --psi-f 0 --saturation 0.4",
     "--pole-pairs 10 --rs 0.0255 --max-current 84.4 --udc 48 --max-speed-rpm 2424 --max-switching-hz 10000 --ld 0.0000662 --lq 0.000423 --psi-f 0 --saturation 0.5",
+    // Strong magnets and little inductance: pulses of a share of the magnets' flux linkage tripped.
+    "--pole-pairs 4 --rs 0.2 --max-current 25 --udc 320 --max-speed-rpm 1500 --max-switching-hz 20000 --ld 0.0005 --lq 0.0007 --psi-f 0.2",
+    // A slow rotor, whose pushes take long.
+    "--pole-pairs 44 --rs 0.004 --ld 0.0011 --lq 0.0013 --psi-f 6.5 --max-current 1400 --udc 1100 --max-speed-rpm 20 --max-switching-hz 2500",
 ];
 
 #[test]
 fn machines_of_a_nameplate_start_from_any_angle() {
     NAMEPLATES.par_iter().for_each(|values| {
         let folder = made(values);
-        for from_deg in [0.0, 77.0, 200.0, 311.0] {
-            let line = format!("start --machine {} --from-deg {from_deg}", folder.path().display());
-            let (recording, broken) = run(&line);
-            assert!(broken.is_empty(), "{values} from {from_deg}°: {broken:?}");
-            let off_deg = recording.found.map_or(0.0, |found| found.error_deg.abs());
-            assert!(off_deg < 0.5, "{values} from {from_deg}°: {off_deg}°");
-        }
+        starts_of(values, &folder, None);
     });
+}
+
+/// A servo motor by itself. Its drift after the pushes, of some 10° a second, goes on for as long as nothing brakes it, which in the rig nothing does; where its index
+/// passes while it swings, that swing.
+#[test]
+fn a_light_rotor_starts() {
+    let values = "--pole-pairs 4 --rs 1.1 --ld 0.0055 --lq 0.0065 --psi-f 0.155 --max-current 35 --udc 560 --max-speed-rpm 6000 --max-switching-hz 8000 \
+        --inertia 0.0008";
+    starts_of(values, &made(values), Some("turned backward"));
+}
+
+/// Starts from several angles, that keep their bounds, all but one.
+fn starts_of(values: &str, folder: &TempDir, but: Option<&str>) {
+    for from_deg in [0.0, 77.0, 200.0, 311.0] {
+        let line = format!("start --machine {} --from-deg {from_deg}", folder.path().display());
+        let (recording, mut broken) = run(&line);
+        broken.retain(|verdict| but.is_none_or(|but| !verdict.contains(but)));
+        assert!(broken.is_empty(), "{values} from {from_deg}°: {broken:?}");
+        let off_deg = recording.found.map_or(0.0, |found| found.error_deg.abs());
+        assert!(off_deg < 0.5, "{values} from {from_deg}°: {off_deg}°");
+    }
 }
 
 /// A machine without saliency shows no axis. The pulses of unequal lengths, which added up, turned its rotor again and again, and none of them ended it.

@@ -33,9 +33,11 @@ pub struct Nameplate {
 
 /// Steps of the grid up to the largest current.
 const STEPS: i32 = 25;
-/// Steps beyond it, and along +d at least.
+/// Steps beyond it.
 const BEYOND: i32 = 2;
-const POSITIVE: i32 = 5;
+/// Steps along +d: as far as the pulses that find the angle at standstill go. Beyond the grid the map goes on straight, which would show them magnets on the
+/// wrong side.
+const POSITIVE: i32 = (PULSE_SHARE * STEPS as f32) as i32 + 1;
 
 impl Nameplate {
     /// Makes the folder.
@@ -85,21 +87,11 @@ impl Nameplate {
         (self.psi_f + left * self.ld * id_a, left * self.lq * iq_a)
     }
 
-    /// Steps along +d: as far as the pulses that find the angle at standstill go. Beyond the grid the map goes on straight, which would show them magnets on
-    /// the wrong side.
-    fn positive(&self) -> i32 {
-        let reached = |step: &i32| {
-            let id_a = self.given.max_current * f64::from(*step) / f64::from(STEPS);
-            self.flux(id_a, 0.0).0 - self.psi_f >= f64::from(PULSE_SHARE) * self.psi_f
-        };
-        (POSITIVE..=STEPS).find(reached).unwrap_or(STEPS)
-    }
-
     /// The map on the grid.
     fn map(&self) -> FluxMap {
         let current_a =
             |step: i32| write::digits(self.given.max_current * f64::from(step) / f64::from(STEPS));
-        let id_a: Vec<_> = (-STEPS - BEYOND..=self.positive()).map(current_a).collect();
+        let id_a: Vec<_> = (-STEPS - BEYOND..=POSITIVE).map(current_a).collect();
         let iq_a: Vec<_> = (-STEPS - BEYOND..=STEPS + BEYOND).map(current_a).collect();
         let nodes = || id_a.iter().flat_map(|id| iq_a.iter().map(|iq| self.flux(*id, *iq)));
         let (psi_d_wb, psi_q_wb) = nodes().map(|(d, q)| (write::digits(d), write::digits(q))).unzip();

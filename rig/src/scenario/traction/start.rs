@@ -30,20 +30,45 @@ fn turn(text: &str) -> Result<f64, String> {
 
 const CHARGE: (f64, f64) = (0.1, 0.2);
 const ENABLE_S: f64 = 0.3;
-/// Share of the largest torque that is demanded from these times on.
-const TORQUE: [(f64, f64); 2] = [(0.8, 0.2), (1.1, 0.0)];
-/// The torque is judged.
-const JUDGED_S: (f64, f64) = (0.95, 1.09);
+/// Torque is demanded from here on, of a machine whose pushes last no longer than usual; and for how long.
+const TORQUE_S: (f64, f64) = (0.8, 0.3);
+/// Largest share of the largest torque, and of the largest speed that a light rotor is taken to by less.
+const TORQUE_SHARE: f64 = 0.2;
+const SPEED_SHARE: f64 = 0.5;
+/// The torque is judged from so long after it is demanded, and until so long before it ends.
+const JUDGED_S: (f64, f64) = (0.15, 0.01);
 /// The time that torque takes from an angle that is found later on.
 const COMES_S: f64 = 0.05;
-const DURATION_S: f64 = 1.2;
+const REST_S: f64 = 0.1;
+/// Lengths of a push, of a tenth of the largest torque over 2°, in which the polarity is found, and the time that is there for them anyway.
+const PUSHES: f64 = 16.0;
+const USUAL_PUSHES_S: f64 = 0.3;
 
-fn request(t_s: f64, ratings: &Ratings) -> Request {
-    Request {
-        enable: t_s >= ENABLE_S,
-        charge: within(&[CHARGE], t_s),
-        torque_nm: held(&TORQUE, t_s).unwrap_or(0.0) as f32 * ratings.max_torque_nm,
-        ..Request::idle(ratings)
+/// The torque's course: from when until when in s, and how much of the largest it is.
+struct Torque {
+    from_s: f64,
+    until_s: f64,
+    share: f64,
+}
+
+impl Torque {
+    fn of(ratings: &Ratings) -> Self {
+        let acceleration = f64::from(ratings.max_acceleration_rad_s2);
+        let push_s = (2.0 * 2.0_f64.to_radians() / (0.1 * acceleration)).sqrt();
+        let from_s = TORQUE_S.0 + (PUSHES * push_s - USUAL_PUSHES_S).max(0.0);
+        let fast_rad_s = SPEED_SHARE * f64::from(ratings.pole_pairs * ratings.max_speed_rad_s);
+        let share = TORQUE_SHARE.min(fast_rad_s / (acceleration * TORQUE_S.1));
+        Self { from_s, until_s: from_s + TORQUE_S.1, share }
+    }
+
+    fn request(&self, t_s: f64, ratings: &Ratings) -> Request {
+        let share = held(&[(self.from_s, self.share), (self.until_s, 0.0)], t_s).unwrap_or(0.0);
+        Request {
+            enable: t_s >= ENABLE_S,
+            charge: within(&[CHARGE], t_s),
+            torque_nm: share as f32 * ratings.max_torque_nm,
+            ..Request::idle(ratings)
+        }
     }
 }
 
@@ -63,9 +88,12 @@ impl Scenario<Traction> for Start {
         let source = Source { voltage_v: udc_v(options, machine), ..link.source };
         let line = LinePlan {
             starts_charged: true,
-            ..LinePlan::new(DcLinkSettings { source, ..link }, Box::new(|t_s| request(t_s, ratings)))
+            ..LinePlan::new(
+                DcLinkSettings { source, ..link },
+                Box::new(|t_s| Torque::of(ratings).request(t_s, ratings)),
+            )
         };
-        let plan = Plan::operated(DURATION_S, Vec::new(), line);
+        let plan = Plan::operated(Torque::of(ratings).until_s + REST_S, Vec::new(), line);
         let encoder = Encoder::new(ratings, self.from_deg / 360.0);
         let inertia_kg_m2 = parameters.rotor_inertia_kg_m2;
         let free = SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 };
@@ -74,12 +102,15 @@ impl Scenario<Traction> for Start {
 
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
-        let wanted_nm = TORQUE[0].1 * machine.folder.parameters.max_torque_nm;
+        let (largest_nm, torque) =
+            (machine.folder.parameters.max_torque_nm, Torque::of(&machine.tables.ratings));
         let found = recording.found;
         // Torque that waits for the angle is judged once it has come.
-        let begin_s = found.map_or(JUDGED_S.0, |found| JUDGED_S.0.max(found.t_s + COMES_S));
-        let judged = analysis::window(recording, begin_s, JUDGED_S.1);
-        let torque_error = (mean(judged, |row| row.te_nm) / wanted_nm - 1.0).abs();
+        let begin_s = torque.from_s + JUDGED_S.0;
+        let begin_s = found.map_or(begin_s, |found| begin_s.max(found.t_s + COMES_S));
+        let judged = analysis::window(recording, begin_s, torque.until_s - JUDGED_S.1);
+        let off_share = (mean(judged, |row| row.te_nm) / largest_nm - torque.share).abs();
+        let torque_error = off_share / TORQUE_SHARE;
         let (error_deg, backward_deg) = (found.map(|found| found.error_deg), backward_deg(recording));
         figures.set("angle_found_after_s", found.map(|found| found.t_s - ENABLE_S));
         figures.set("angle_error_deg", error_deg);
@@ -98,7 +129,7 @@ impl Scenario<Traction> for Start {
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
         line::plots(page, recording);
-        let end_s = recording.found.map_or(TORQUE[0].0, |found| found.t_s + 0.01);
+        let end_s = recording.found.map_or(TORQUE_S.0, |found| found.t_s + 0.01);
         page.zoom("the angle is found", recording, (ENABLE_S, end_s));
         page.zoom("the last pulses", recording, (end_s - 0.03, end_s));
     }
