@@ -333,10 +333,17 @@ pub const fn axis_error(ratings: &Ratings, error: Angle) -> Angle {
 }
 
 /// By how much the pulses' current along −d takes the flux linkage down, and along +d up, in Wb.
+#[inline(never)]
 fn along_d_wb(tables: &Tables) -> (f32, f32) {
     let current_a = PULSE_SHARE * tables.ratings.max_current_a;
-    let at = |id_a: f32| tables.flux.at(id_a, 0.0)[0];
-    (at(0.0) - at(-current_a), at(current_a) - at(0.0))
+    let [down_wb, none_wb, up_wb] = [-current_a, 0.0, current_a].map(|id_a| psi_d_wb(tables, id_a));
+    (none_wb - down_wb, up_wb - none_wb)
+}
+
+/// Flux linkage along d of a current along it, in Wb.
+#[inline(never)]
+fn psi_d_wb(tables: &Tables, id_a: f32) -> f32 {
+    tables.flux.at(id_a, 0.0)[0]
 }
 
 /// `true` of a map whose iron saturates along −d rather than +d.
