@@ -47,7 +47,7 @@ const MEND_SHARE: f32 = 0.7;
 const MENDS: u32 = 4;
 
 /// `B` over `A` from which there is an axis.
-const SALIENT: f32 = 0.03;
+pub const SALIENT: f32 = 0.03;
 /// Share of the currents' way along the pulses that shows the polarity.
 const POLAR_SHARE: f32 = 0.02;
 /// Share by which the map's iron may saturate along −d more than along +d.

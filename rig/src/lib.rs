@@ -13,6 +13,8 @@ pub mod benchmark;
 pub mod bound;
 pub mod campaign;
 pub mod can;
+#[cfg(unix)]
+mod coenergy;
 pub mod columns;
 #[cfg(unix)]
 pub mod commission;

@@ -10,7 +10,7 @@ use clap::builder::PossibleValuesParser;
 use std::path::Path;
 use tractive::frames::{Angle, six_step_v};
 use tractive::modulation::{Mode, Modulator, Reference, Schedule, SwitchLimits, index_limit};
-use tractive::time::{Clock, Instant};
+use tractive::time::Instant;
 
 /// The pattern to make.
 #[derive(Clone, Copy, Debug, clap::Args)]
@@ -77,8 +77,7 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
         wanted.max_switching_hz,
         &CLOCK,
     );
-    // A carrier lasts a control period at least.
-    devices.check(&run::clock(Clock::control_hz(wanted.max_switching_hz))).map_err(refused)?;
+    devices.check(&run::usual_clock(wanted.max_switching_hz)?).map_err(refused)?;
     let rate = (wanted.f1_hz * tick_s * 4_294_967_296.0) as f32;
     let lowest_hz = LONGEST_S.recip();
     if !(lowest_hz..=HIGHEST_HZ).contains(&wanted.f1_hz) {

@@ -2,69 +2,17 @@
 
 #[path = "../../tablegen/tests/common/mod.rs"]
 mod folders;
+mod imported;
 
-use folders::{SMALL, axis};
-use std::fmt::Write as _;
-use std::path::Path;
-use std::process::{Command, Output};
-use tractive_rig::machine::Machine;
-use tractive_tablegen::SmoothMap;
-
-const LIMITS: &str =
-    "--pole-pairs 3 --rs 0.1 --max-current 20 --udc 560 --max-speed-rpm 6000 --max-switching-hz 5000";
-
-fn import(map: &Path, options: &str, out: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_tractive-rig"))
-        .args(["machine", "import"])
-        .arg(map)
-        .args(LIMITS.split_whitespace())
-        .args(options.split_whitespace())
-        .arg("--out")
-        .arg(out)
-        .output()
-        .unwrap()
-}
-
-/// Flux linkage of the machine at a current.
-type Flux = fn(f64, f64) -> (f64, f64);
-
-fn truth(id: f64, iq: f64) -> (f64, f64) {
-    SMALL.truth.flux(id, iq)
-}
-
-/// A map: its head, its values of both currents, and a row from currents (the map's own) and flux linkages.
-fn map(head: &str, first: &[f64], second: &[f64], row: impl Fn(f64, f64) -> String) -> String {
-    let mut text = format!("{head}\n");
-    for a in first {
-        for b in second {
-            let _ = writeln!(text, "{}", row(*a, *b));
-        }
-    }
-    text
-}
+use folders::axis;
+use imported::{error, import, map, truth};
+use std::process::Command;
 
 /// Values that are dense about 0 and sparse far from it.
 fn uneven(first: f64, last: f64, count: usize) -> Vec<f64> {
     let place = |k: usize| 2.0 * k as f64 / (count - 1) as f64 - 1.0;
     let bent = |x: f64| 0.5 * (x + x.powi(3));
     (0..count).map(|k| 0.5 * (first + last) + 0.5 * (last - first) * bent(place(k))).collect()
-}
-
-/// The largest error of the imported map within the current limit, as a share of the largest flux linkage.
-fn error(folder: &Path, wanted: Flux) -> f64 {
-    let machine = Machine::load(&folder.display().to_string()).unwrap();
-    let smooth = SmoothMap::new(&machine.folder.map);
-    let (top_d, top_q) = wanted(0.0, 20.0);
-    let mut worst: f64 = 0.0;
-    for k in 0..=40 {
-        for angle in 0..=36 {
-            let (sin, cos) = (f64::from(angle) * 5.0_f64.to_radians()).sin_cos();
-            let (id, iq) = (-0.5 * f64::from(k) * sin, 0.5 * f64::from(k) * cos);
-            let (at, (psi_d, psi_q)) = (smooth.at(id, iq), wanted(id, iq));
-            worst = worst.max((at.psi_d_wb - psi_d).hypot(at.psi_q_wb - psi_q) / top_d.hypot(top_q));
-        }
-    }
-    worst
 }
 
 /// Maps as other tools write them: what is odd, the file, the options that it takes, and the largest error.
@@ -127,10 +75,35 @@ fn foreign() -> [(&'static str, String, &'static str, f64); 5] {
     ]
 }
 
+/// Maps that are laid out in other ways, likewise.
+fn laid_out() -> [(&'static str, String, &'static str, f64); 2] {
+    let (d, q) = (axis(-22.0, 1.0, 26), axis(0.0, 1.0, 23));
+    [
+        (
+            "units in the line below the head",
+            map("I_d,I_q,Psi_d,Psi_q\n(A),(A),(mWb),(mWb)", &d, &q, |id, iq| {
+                let (psi_d, psi_q) = truth(id, iq);
+                format!("{id},{iq},{:.6},{:.6}", 1e3 * psi_d, 1e3 * psi_q)
+            }),
+            "",
+            1e-4,
+        ),
+        (
+            "blanks between columns, parts of complex numbers",
+            map("  i_s_dq.real i_s_dq.imag  psi_s_dq.real psi_s_dq.imag", &d, &q, |id, iq| {
+                let (psi_d, psi_q) = truth(id, iq);
+                format!("{id:6}   {iq:6} {psi_d:.9}  {psi_q:.9}")
+            }),
+            "",
+            1e-4,
+        ),
+    ]
+}
+
 #[test]
 fn maps_of_other_tools_are_the_machine_that_they_are_of() {
     let folder = tempfile::tempdir().unwrap();
-    for (k, (what, text, options, bound)) in foreign().iter().enumerate() {
+    for (k, (what, text, options, bound)) in foreign().iter().chain(&laid_out()).enumerate() {
         let (file, out) = (folder.path().join(format!("{k}.csv")), folder.path().join(format!("made-{k}")));
         std::fs::write(&file, text).unwrap();
         let output = import(&file, options, &out);
@@ -158,8 +131,8 @@ fn what_is_wrong_with_a_map_is_named_with_file_line_and_column() {
         (line(7, "-22,10,x,0.2"), "", "map.csv:7: psi_d_wb: x: must be a number"),
         (line(7, "-22,10,0.1"), "", "map.csv:7: psi_q_wb: : must be a number"),
         (line(7, "-22,8,0.1,0.2"), "", "map.csv:7: id -22, iq 8: must be there once: is in line 6 too"),
-        (line(7, "#"), "", "id -22, iq 10: missing"),
         (line(1, "id_a,iq_a,psi_d_wb,torque"), "", "map.csv:1: no column for psi_q"),
+        (line(1, "id_a,iq_a,L_d,L_q"), "", "is id_a, iq_a, L_d, L_q; inductances are no flux linkages"),
         (line(1, "id_a,Id,psi_d_wb,psi_q"), "", "map.csv:1: Id: must be there once: id_a is id too"),
         (line(1, "id_a,iq_a,psi_d [V],psi_q"), "", "map.csv:1: psi_d [V]: unit v: must be one of wb"),
         (line(2, "-22,0,-0.01,0.09"), "", "map.csv:2: psi_q: 0.09: must be 0 at iq = 0"),
@@ -169,6 +142,7 @@ fn what_is_wrong_with_a_map_is_named_with_file_line_and_column() {
             "map.csv:31: psi_q: 0.194442719: must rise with iq, above 0.2 of line 30",
         ),
         (good.clone(), "--negate psi_q", "must rise with iq, above"),
+        (good.clone(), "--negate psi_q", "; without options for axes and signs it is a machine's"),
         (good.clone(), "--negate id_a", "'--negate"),
         (good.clone(), "--flux-factor 0", "--flux-factor 0: must be above 0"),
         (
@@ -184,12 +158,17 @@ fn what_is_wrong_with_a_map_is_named_with_file_line_and_column() {
             "",
             "map.csv: id: begins at 0: must go below 0",
         ),
-        (good.replace("id_a,", "id_ma,"), "", "--max-current 20: must be at most 0.022"),
+        (
+            good.replace("id_a,", "id_ma,"),
+            "",
+            "--max-current 20: must be at most 0.022: map.csv ends there along −d: are its currents in kA",
+        ),
     ] {
         std::fs::write(&file, text).unwrap();
         let output = import(&file, options, &out);
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{told}: {said}");
+        let said = said.replace(&format!("{}/", folder.path().display()), "");
         assert!(said.contains(told), "{told}: {said}");
         assert!(!out.exists(), "{told}");
     }

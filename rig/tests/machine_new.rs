@@ -178,6 +178,40 @@ fn values_in_other_units_are_asked_about() {
         let said = [output.stdout, output.stderr].concat();
         let said = String::from_utf8_lossy(&said);
         assert_eq!(output.status.code(), Some(code), "{lq_h}: {said}");
-        assert_eq!(said.contains("are inductances in H, flux linkages in Wb?"), asked, "{lq_h}: {said}");
+        assert_eq!(said.contains("are inductances in H, flux linkages in Wb"), asked, "{lq_h}: {said}");
+    }
+}
+
+/// Carriers that need more control than is usual: the option that gives it is named where the machine is made, and where it is missing.
+#[test]
+fn the_rate_of_control_that_fast_devices_need_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("made");
+    let told = new(&with("--max-switching-hz", "40000"), &out);
+    let said = String::from_utf8_lossy(&told.stdout);
+    assert!(said.contains("run and identify with --control-hz 40000"), "{said}");
+    let usual = new(&with("--max-switching-hz", "20000"), &folder.path().join("usual"));
+    assert!(!String::from_utf8_lossy(&usual.stdout).contains("--control-hz"), "{usual:?}");
+    for (command, words) in [
+        ("run load-steps", "must be from 50 to 20000, the rate of control: --control-hz 40000 goes with it"),
+        (
+            "campaign --fast",
+            "must be at most 20000, the rate of control of this command; run and identify take --control-hz 40000",
+        ),
+        (
+            "pattern --u 10 --udc 48 --f1 50 --mode async",
+            "must be at most 20000, the rate of control of this command",
+        ),
+    ] {
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        rig.args(command.split_whitespace())
+            .arg("--machine")
+            .arg(&out)
+            .arg("--out")
+            .arg(folder.path().join("x"));
+        let output = rig.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{command}: {said}");
+        assert!(said.contains(&format!("max_switching_hz 40000: {words}")), "{command}: {said}");
     }
 }

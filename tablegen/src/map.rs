@@ -56,7 +56,10 @@ impl FluxMap {
     }
 
     /// The same of a text that is there; errors name `file`.
-    pub(crate) fn parse(text: &[u8], file: &Path) -> Result<Self, InputError> {
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(text: &[u8], file: &Path) -> Result<Self, InputError> {
         let mut nodes = read_nodes(text, file)?;
         let (id_a, iq_a) = axes(&nodes, file)?;
         let sorted = nodes.is_sorted_by(|a, b| a.place(b).is_le());

@@ -2,111 +2,149 @@
 
 /// Quantities, in the order in which their columns are kept.
 pub const QUANTITIES: [&str; 4] = ["id", "iq", "psi_d", "psi_q"];
+/// Places of the current's magnitude and of its angle, which may stand for id and iq.
+pub const MAGNITUDE: usize = 4;
+/// See [`MAGNITUDE`].
+pub const ANGLE: usize = 5;
 
-/// A column: its name in the file, the quantity, and the factor that makes its values A or Wb, peak.
+/// A column: its name in the file, the quantity, and the factor that makes its values A, Wb or rad, peak.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// The name, as it stands in the file.
     pub name: String,
-    /// Place in [`QUANTITIES`].
+    /// Place in [`QUANTITIES`], or [`MAGNITUDE`], or [`ANGLE`].
     pub quantity: usize,
-    /// Peak value in A or Wb of a one in the file.
+    /// Peak value in A, Wb or rad of a one in the file.
     pub factor: f64,
+    /// `true` if the name says the unit.
+    pub has_unit: bool,
 }
 
-/// Names of a current along an axis, less the axis' letter `d`.
-const CURRENTS: [&str; 10] = [
-    "id",
-    "isd",
-    "ids",
-    "currentd",
-    "dcurrent",
-    "daxiscurrent",
-    "currentdaxis",
-    "idaxis",
-    "statorcurrentd",
-    "currentsd",
+/// Words of a name that say no more than the others do.
+const FILLERS: [&str; 13] = [
+    "axis",
+    "stator",
+    "s",
+    "motor",
+    "machine",
+    "mean",
+    "average",
+    "avg",
+    "strom",
+    "fluss",
+    "component",
+    "value",
+    "winding",
 ];
-/// The same of a flux linkage.
-const FLUXES: [&str; 20] = [
-    "psid",
-    "psisd",
-    "psids",
-    "lambdad",
-    "lambdasd",
-    "fluxd",
-    "dflux",
-    "fluxlinkaged",
-    "dfluxlinkage",
-    "daxisflux",
-    "daxisfluxlinkage",
-    "fluxlinkagedaxis",
-    "fluxdaxis",
-    "linkaged",
-    "fd",
-    "phid",
-    "phisd",
-    "ψd",
-    "λd",
-    "φd",
+/// Words for a current and for a flux linkage, which stand before or behind the axis' letter.
+const CURRENTS: [&str; 4] = ["i", "is", "current", "statorcurrent"];
+const FLUXES: [&str; 16] = [
+    "psi",
+    "psis",
+    "lambda",
+    "lambdas",
+    "flux",
+    "fluxlinkage",
+    "linkedflux",
+    "linkage",
+    "fluxlink",
+    "f",
+    "phi",
+    "phis",
+    "ψ",
+    "λ",
+    "φ",
+    "coilflux",
 ];
-/// Units, and what one of them is in A or Wb.
-const CURRENT_UNITS: [(&str, f64); 4] = [("a", 1.0), ("ma", 1e-3), ("ka", 1e3), ("amp", 1.0)];
-const FLUX_UNITS: [(&str, f64); 11] = [
+/// Names of the axes behind those words: of a complex number, d is the real part.
+const AXES: [[&str; 4]; 2] = [["d", "ds", "dqreal", "dqre"], ["q", "qs", "dqimag", "dqim"]];
+/// Names of a current's magnitude and of its angle.
+const MAGNITUDES: [&str; 9] =
+    ["i", "is", "current", "currentmagnitude", "currentamplitude", "iabs", "imag", "iamp", "imagnitude"];
+const ANGLES: [&str; 14] = [
+    "gamma",
+    "beta",
+    "γ",
+    "β",
+    "currentangle",
+    "currentphase",
+    "currentphaseangle",
+    "phaseadvance",
+    "currentadvance",
+    "advance",
+    "advanceangle",
+    "phaseadvanceangle",
+    "gammaangle",
+    "iangle",
+];
+/// Units, without blanks, and what one of them is in A, Wb or rad.
+type Units = &'static [(&'static str, f64)];
+const CURRENT_UNITS: Units =
+    &[("a", 1.0), ("ma", 1e-3), ("ka", 1e3), ("amp", 1.0), ("amps", 1.0), ("ampere", 1.0)];
+const FLUX_UNITS: Units = &[
     ("wb", 1.0),
     ("mwb", 1e-3),
     ("uwb", 1e-6),
     ("µwb", 1e-6),
     ("vs", 1.0),
-    ("v s", 1.0),
     ("mvs", 1e-3),
-    ("mv s", 1e-3),
     ("weber", 1.0),
     ("wbt", 1.0),
+    ("wbturn", 1.0),
     ("wbturns", 1.0),
 ];
+const DEGREE: f64 = core::f64::consts::PI / 180.0;
+const ANGLE_UNITS: Units = &[
+    ("deg", DEGREE),
+    ("edeg", DEGREE),
+    ("elecdeg", DEGREE),
+    ("degree", DEGREE),
+    ("degrees", DEGREE),
+    ("rad", 1.0),
+];
 
-/// The meaning of a column by its name; nothing where it is none of the four quantities. `rms` holds where the name does not say.
+/// Words of a text, of letters and digits.
+fn words(text: &str) -> impl Iterator<Item = String> + '_ {
+    text.split(|letter: char| !letter.is_alphanumeric()).filter(|part| !part.is_empty()).map(str::to_owned)
+}
+
+/// The meaning of a column by its name; nothing where it is none of the quantities. `rms` holds where the name does not say.
 ///
 /// # Errors
 /// A unit in brackets that is none of the quantity's.
 pub fn column(name: &str, rms: bool) -> Result<Option<Column>, String> {
-    let lower = name.trim().trim_matches('"').to_lowercase();
-    let bracketed: Vec<&str> =
-        lower.split(['(', '[', '{']).skip(1).filter_map(|part| part.split([')', ']', '}']).next()).collect();
-    let outside: String = lower
-        .split([')', ']', '}'])
-        .filter_map(|part| part.split(['(', '[', '{']).next())
-        .collect::<Vec<_>>()
-        .join(" ");
-    let word = |text: &str| -> Vec<String> {
-        let parts = text.split(|letter: char| !letter.is_alphanumeric());
-        parts.filter(|part| !part.is_empty()).map(str::to_owned).collect()
-    };
-    let mut words = word(&outside);
-    let mut units: Vec<String> = bracketed.iter().flat_map(|text| word(text)).collect();
+    let lower = name.trim().trim_matches('"').to_lowercase().replace('°', "deg");
+    let parts: Vec<&str> = lower.split(['(', '[', '{']).collect();
+    let inside = |part: &&str| part.split([')', ']', '}']).next().map(str::to_owned);
+    let mut units: Vec<String> =
+        parts[1..].iter().filter_map(inside).flat_map(|text| words(&text).collect::<Vec<_>>()).collect();
+    let outside = parts.iter().enumerate().map(|(k, part)| {
+        if k == 0 { part } else { part.split_once([')', ']', '}']).map_or("", |(_, rest)| rest) }
+    });
+    let mut words: Vec<String> = words(&outside.collect::<Vec<_>>().join(" ")).collect();
     let said = amplitude(&mut words).or(amplitude(&mut units));
-    let factor = if said.unwrap_or(rms) { 2.0_f64.sqrt() } else { 1.0 };
-    let unit_in_brackets = (!units.is_empty()).then(|| units.join(" "));
+    let in_brackets = (!units.is_empty()).then(|| units.concat());
     for tail in [0, 1, 2] {
         // A unit may stand at the end of the name: `id_a`, `psi_d_v_s`.
         let Some(kept) = words.len().checked_sub(tail) else { break };
-        let Some((quantity, known)) = quantity(&words[..kept].concat()) else { continue };
-        let of = |unit: &str| known.iter().find(|(one, _)| *one == unit).map(|(_, size)| *size);
-        let after = (tail > 0).then(|| words[kept..].join(" "));
-        let size = match after.as_deref().or(unit_in_brackets.as_deref()) {
-            None => 1.0,
-            Some(unit) => match of(unit) {
-                Some(size) => size,
-                None if tail > 0 => continue,
-                None => {
-                    let units: Vec<_> = known.iter().map(|(unit, _)| *unit).collect();
-                    return Err(format!("unit {unit}: must be one of {}", units.join(", ")));
-                }
-            },
+        let Some((quantity, known)) = quantity(&words[..kept]) else { continue };
+        let after = (tail > 0).then(|| words[kept..].concat());
+        let unit = after.or_else(|| in_brackets.clone());
+        let size = known.iter().find(|(one, _)| unit.as_deref() == Some(*one)).map(|(_, size)| *size);
+        let size = match (size, &unit) {
+            (Some(size), _) => size,
+            (None, None) if quantity == ANGLE => DEGREE,
+            (None, None) => 1.0,
+            (None, Some(_)) if tail > 0 => continue,
+            (None, Some(unit)) => {
+                let units: Vec<_> = known.iter().map(|(unit, _)| *unit).collect();
+                return Err(format!("unit {unit}: must be one of {}", units.join(", ")));
+            }
         };
+        let is_rms = quantity != ANGLE && said.unwrap_or(rms);
+        let factor = if is_rms { size * 2.0_f64.sqrt() } else { size };
         let name = name.trim().trim_matches('"').to_owned();
-        return Ok(Some(Column { name, quantity, factor: factor * size }));
+        return Ok(Some(Column { name, quantity, factor, has_unit: unit.is_some() }));
     }
     Ok(None)
 }
@@ -123,25 +161,31 @@ fn amplitude(words: &mut Vec<String>) -> Option<bool> {
     Some(word == "rms" || word == "eff")
 }
 
-/// The quantity of a name without blanks, and its units.
-fn quantity(name: &str) -> Option<(usize, &'static [(&'static str, f64)])> {
-    let along = |names: &[&str], axis: char| {
-        names.iter().any(|known| {
-            // The axis is the only d in a name, but for the one of `lambda`.
-            let (head, tail) = known.strip_prefix("lambda").map_or(("", *known), |tail| ("lambda", tail));
-            format!("{head}{}", tail.replace('d', &axis.to_string())) == name
+/// The quantity of a name's words, and its units.
+fn quantity(words: &[String]) -> Option<(usize, Units)> {
+    let said: Vec<&str> =
+        words.iter().map(String::as_str).filter(|word| words.len() == 1 || !FILLERS.contains(word)).collect();
+    let name = said.concat();
+    let along = |names: &[&str], axis: usize| {
+        names.iter().any(|word| {
+            let before = name.strip_prefix(AXES[axis][0]);
+            // Not `di` or `df`, which are differences.
+            let behind = name.strip_prefix(word);
+            behind.is_some_and(|rest| AXES[axis].contains(&rest)) || (word.len() > 2 && before == Some(word))
         })
     };
-    let of = |axis: usize, letter: char| {
-        if along(&CURRENTS, letter) {
-            Some((axis, &CURRENT_UNITS[..]))
-        } else if along(&FLUXES, letter) {
-            Some((axis + 2, &FLUX_UNITS[..]))
-        } else {
-            None
+    for axis in 0..AXES.len() {
+        if along(&CURRENTS, axis) {
+            return Some((axis, CURRENT_UNITS));
         }
-    };
-    of(0, 'd').or_else(|| of(1, 'q'))
+        if along(&FLUXES, axis) {
+            return Some((axis + 2, FLUX_UNITS));
+        }
+    }
+    if MAGNITUDES.contains(&name.as_str()) {
+        return Some((MAGNITUDE, CURRENT_UNITS));
+    }
+    ANGLES.contains(&name.as_str()).then_some((ANGLE, ANGLE_UNITS))
 }
 
 #[cfg(test)]
@@ -169,6 +213,22 @@ mod tests {
             ("Flux Linkage Q (mVs)", 3, 1e-3),
             ("\"psi_q rms\"", 3, root),
             ("ψ_d [Wb]", 2, 1.0),
+            ("i_s_dq.real (A)", 0, 1.0),
+            ("psi_s_dq.imag (Vs)", 3, 1.0),
+            ("Strom Id [A]", 0, 1.0),
+            ("Stator Current Q (RMS)", 1, root),
+            ("D-Axis Flux Linkage (Wb)", 2, 1.0),
+            ("lambda_q (Wb-turns)", 3, 1.0),
+            ("FluxLinkage_d", 2, 1.0),
+            ("Iq_avg [A]", 1, 1.0),
+            ("Phi_d", 2, 1.0),
+            ("fluxQ_Wb", 3, 1.0),
+            ("psi_d_mV_s", 2, 1e-3),
+            ("Is (RMS) [A]", MAGNITUDE, root),
+            ("Stator Current [kA]", MAGNITUDE, 1e3),
+            ("Gamma [EDeg]", ANGLE, DEGREE),
+            ("Phase Advance (°)", ANGLE, DEGREE),
+            ("beta_rad", ANGLE, 1.0),
         ] {
             let found = column(name, false).unwrap().unwrap_or_else(|| panic!("{name}"));
             assert_eq!(found.quantity, quantity, "{name}");
@@ -176,7 +236,8 @@ mod tests {
         }
         assert!((column("id_a", true).unwrap().unwrap().factor - root).abs() < 1e-12);
         assert!((column("Id (peak)", true).unwrap().unwrap().factor - 1.0).abs() < 1e-12);
-        for other in ["torque", "T_nm", "theta", "speed", "", "d", "id_v"] {
+        for other in ["torque", "T_nm", "theta", "speed", "", "d", "id_v", "dI", "df", "Ld", "s", "FluxA(Wb)"]
+        {
             assert_eq!(column(other, false), Ok(None), "{other}");
         }
         assert!(column("id [V]", false).unwrap_err().contains("unit v: must be one of a, ma"));

@@ -1,48 +1,31 @@
 //! A flux map as another tool writes it.
 
+use super::axes::{self, GAP, SHORT};
+use super::fitted::fitted;
 use super::given::Given;
-use super::header::QUANTITIES;
 use super::ratings::Ratings;
+use super::reading::Reading;
 use super::rectangle::Rectangle;
-use super::samples::{Sample, read};
+use super::samples::{Samples, read};
+use super::torque;
 use super::write;
 use crate::options::finite;
-use anyhow::{Result, ensure};
-use clap::{Args, ValueEnum};
+use anyhow::{Result, anyhow, ensure};
+use clap::Args;
 use std::path::PathBuf;
 use tractive_tablegen::FluxMap;
-
-/// The direction of a map's d axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum DAxis {
-    /// Along the magnets' flux, or of a machine without magnets along the larger reluctance.
-    Magnet,
-    /// Along the least reluctance, with the magnets along −q: as SynRM and PMaSynRM are often described.
-    Reluctance,
-}
-
-impl DAxis {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Magnet => "magnet",
-            Self::Reluctance => "reluctance",
-        }
-    }
-}
 
 /// A map, and how it is to be read.
 #[derive(Clone, Debug, Args)]
 pub struct Import {
     /// The map: a CSV with currents and flux linkages of both axes in named columns, in any order, with their units (`Id [A]`, `psi_q_mWb`,
-    /// `Flux Linkage D (Vs)`; A and Wb where none is said), every node of a grid once. Further columns are left out.
+    /// `Flux Linkage D (Vs)`; A and Wb where none is said); the current's magnitude and angle (`Is`, `gamma [deg]`) may stand for both currents.
+    /// Further columns are left out.
     #[arg(value_name = "MAP.csv")]
     pub map: PathBuf,
-    /// Direction of the map's d axis.
-    #[arg(long, value_enum, default_value = "magnet")]
-    pub d_axis: DAxis,
-    /// Quantities that the map counts the other way round.
-    #[arg(long, value_delimiter = ',', value_parser = QUANTITIES, value_name = "QUANTITY,…")]
-    pub negate: Vec<String>,
+    /// The meaning of its axes and signs.
+    #[command(flatten)]
+    pub reading: Reading,
     /// Values are rms where their column does not say peak or rms.
     #[arg(long)]
     pub rms: bool,
@@ -65,85 +48,96 @@ impl Import {
     pub fn make(&self) -> Result<()> {
         self.given.check()?;
         ensure!(self.flux_factor > 0.0, "--flux-factor {}: must be above 0", self.flux_factor);
-        let mut samples = read(&self.map, self.rms)?;
-        samples.iter_mut().for_each(|sample| self.turn(sample));
-        let rectangle = Rectangle::of(&samples, &self.map)?;
-        let half = rectangle.folded(SYMMETRY, &self.map)?;
-        half.check_rising(&self.map)?;
-        let map = self.resampled(&half)?;
+        let samples = read(&self.map, self.rms)?;
+        let (map, fit) = self.taken(&samples)?;
         let mut ratings = Ratings::of(&map, &self.given)?;
-        let comment = format!("# From {}.\n", self.map.display());
+        let fit_line = fit.as_ref().map_or(String::new(), |fit| format!("# {fit}.\n"));
+        let comment = format!("# From {}.\n{fit_line}", self.map.display());
         let contents = ratings.contents(&self.given, &self.told(), write::csv(&map, &comment))?;
         write::folder(&self.given.out, &contents)?;
-        ratings.say(&self.given)
+        let rows = samples.rows.iter().map(|row| (row.values, row.torque_nm));
+        let question = torque::question(rows, self.given.pole_pairs, self.flux_factor);
+        ratings.say(&self.given, &fit.into_iter().chain(question).collect::<Vec<_>>())
     }
 
-    /// Into the project's frame.
-    fn turn(&self, sample: &mut Sample) {
-        for name in &self.negate {
-            if let Some(place) = QUANTITIES.iter().position(|quantity| quantity == name) {
-                sample.values[place] *= -1.0;
+    /// The map, and the words of its fit if it had to be fitted.
+    ///
+    /// # Errors
+    /// The reason for which it is no machine's, and where another reading of axes and signs would make it one, that.
+    fn taken(&self, samples: &Samples) -> Result<(FluxMap, Option<String>)> {
+        self.read_as(&self.reading, samples).map_err(|reason| {
+            let other =
+                self.reading.others(samples.is_polar).find(|other| self.read_as(other, samples).is_ok());
+            match other.as_ref().map(Reading::told).as_deref() {
+                None => reason,
+                Some("") => anyhow!("{reason:#}; without options for axes and signs it is a machine's"),
+                Some(options) => anyhow!("{reason:#}; it is a machine's with{options}"),
             }
-        }
-        let [id, iq, psi_d, psi_q] = sample.values;
-        let flux = self.flux_factor;
-        sample.values = match self.d_axis {
-            DAxis::Magnet => [id, iq, flux * psi_d, flux * psi_q],
-            // −q is where the magnets are, and d a quarter of a turn ahead of it.
-            DAxis::Reluctance => [-iq, id, -flux * psi_q, flux * psi_d],
-        }
-        // There is one zero.
-        .map(|value| value + 0.0);
+        })
+    }
+
+    /// The map with its axes and signs as a reading has them: its own nodes, or where those are no full grid or too rough for a machine's, a fit.
+    fn read_as(&self, reading: &Reading, samples: &Samples) -> Result<(FluxMap, Option<String>)> {
+        let rows = reading.of(samples, self.flux_factor);
+        let grid = Rectangle::of(&rows, &self.map);
+        let short = if grid.is_ok() { SHORT } else { GAP };
+        axes::check_ends(&rows, self.given.max_current, short, &self.map)?;
+        let exact = grid.and_then(|grid| self.exact(&grid)).map(|map| (map, None));
+        let (map, fit) = exact.or_else(|reason| {
+            let fitted = fitted(&rows, self.given.max_current, |map| self.check(map));
+            let (map, left) = fitted.map_err(|why| anyhow!("{reason:#}; a fit of one co-energy: {why:#}"))?;
+            Ok::<_, anyhow::Error>((map, Some(left)))
+        })?;
+        axes::check(&map, &self.map)?;
+        Ok((map, fit))
+    }
+
+    /// The map of a grid's own nodes.
+    fn exact(&self, grid: &Rectangle) -> Result<FluxMap> {
+        let half = grid.folded(SYMMETRY, &self.map)?;
+        half.check_rising(&self.map)?;
+        let map = self.resampled(&half);
+        self.check(&map)?;
+        Ok(map)
     }
 
     /// The map on the project's grid, iq of both signs: its own nodes where they are even, otherwise between them.
-    fn resampled(&self, half: &Rectangle) -> Result<FluxMap> {
+    fn resampled(&self, half: &Rectangle) -> FluxMap {
         let most_a = self.given.max_current;
-        let (first, last, last_q) = half.ends();
-        ensure!(
-            first < 0.0,
-            "{}: id: begins at {first}: must go below 0, with d along the magnets (--d-axis, --negate)",
-            self.map.display()
-        );
-        let reach = |ends: f64, what: &str| {
-            ensure!(
-                ends >= most_a * (1.0 - 1e-9),
-                "--max-current {most_a}: must be at most {}: {} ends there along {what}",
-                write::digits(ends),
-                self.map.display()
-            );
-            Ok(())
+        let ends = half.ends();
+        // An axis that ends at the largest current, or at none, but for rounding, ends there.
+        let full = |ends: f64| {
+            [most_a, 0.0, -most_a]
+                .into_iter()
+                .find(|full| (ends - full).abs() <= SHORT * most_a)
+                .unwrap_or(ends)
         };
-        reach(-first, "−d")?;
-        reach(last_q, "q")?;
-        ensure!(
-            last >= 0.0,
-            "{}: id: ends at {last}: must reach 0, with d along the magnets (--d-axis, --negate)",
-            self.map.display()
-        );
-        let (id_a, iq_a) = if half.is_even() {
+        let (first, last, last_q) = (full(ends.0), full(ends.1), full(ends.2));
+        let (id_a, iq_a) = if half.is_even() && (first, last, last_q) == ends {
             (half.id_a.clone(), half.iq_a.clone())
+        } else if half.is_even() {
+            (even(first, last, half.id_a.len()), even(0.0, last_q, half.iq_a.len()))
         } else {
             let step = most_a / f64::from(STEPS);
             let most = |ends: f64| (STEPS + BEYOND).min((ends / step + 1e-6).floor() as i32);
             let along =
                 |from: i32, to: i32| (from..=to).map(|k| write::digits(step * f64::from(k))).collect();
-            let (d, q): (Vec<f64>, Vec<f64>) = (along(-most(-first), most(last)), along(0, most(last_q)));
-            (d, q)
+            (along(-most(-first), most(last)), along(0, most(last_q)))
         };
         let (psi_d, psi_q) = half.at(&id_a, &iq_a);
-        Ok(mirrored(id_a, &iq_a, &psi_d, &psi_q))
+        mirrored(id_a, &iq_a, &psi_d, &psi_q)
+    }
+
+    /// The check that the table generator takes a map.
+    fn check(&self, map: &FluxMap) -> Result<()> {
+        let taken = FluxMap::parse(write::csv(map, "").as_bytes(), &self.map);
+        // Its lines are none of the file's.
+        taken.map(drop).map_err(|error| anyhow!("{}: {}", self.map.display(), error.problem))
     }
 
     /// The command that makes this folder.
     fn told(&self) -> String {
-        let mut text = format!("import {}{}", self.map.display(), self.given.told());
-        if self.d_axis != DAxis::Magnet {
-            text += &format!(" --d-axis {}", self.d_axis.name());
-        }
-        if !self.negate.is_empty() {
-            text += &format!(" --negate {}", self.negate.join(","));
-        }
+        let mut text = format!("import {}{}{}", self.map.display(), self.given.told(), self.reading.told());
         if self.rms {
             text += " --rms";
         }
@@ -152,6 +146,12 @@ impl Import {
         }
         text
     }
+}
+
+/// So many values from one to another, evenly.
+fn even(first: f64, last: f64, count: usize) -> Vec<f64> {
+    let step = (last - first) / (count - 1) as f64;
+    (0..count).map(|k| write::digits(first + step * k as f64)).collect()
 }
 
 /// Both signs of iq from its half: ψ_d even, ψ_q odd.

@@ -1,19 +1,25 @@
 //! `cargo rig machine`: machine folders made, and shown.
 
+mod axes;
+mod fitted;
 mod given;
 mod header;
 mod import;
 mod nameplate;
 mod ratings;
+mod reach;
+mod reading;
 mod rectangle;
 mod ripple;
 mod samples;
 mod show;
+mod torque;
 mod write;
 
 pub use given::Given;
-pub use import::{DAxis, Import};
+pub use import::Import;
 pub use nameplate::Nameplate;
+pub use reading::{AngleFrom, DAxis, Reading};
 pub use show::{Show, page, usual_page};
 pub use write::{Contents, check_place, csv, digits, folder as write_folder, toml};
 
@@ -33,7 +39,8 @@ pub enum MachineCommand {
     /// A machine folder from a flux map of another tool.
     ///
     /// The map's nodes stand on a rectangular grid, even or not, in any order. An even one is taken as it is; between uneven nodes the map is
-    /// interpolated. Of a map with one sign of iq the other is its mirror image. Nothing is written unless the table generator takes the
+    /// interpolated. Nodes anywhere else, and those that are too rough for a machine's, are fitted as the gradient of one co-energy, and what the fit
+    /// leaves is printed. Of a map with one sign of iq the other is its mirror image. Nothing is written unless the table generator takes the
     /// folder: flux linkage that rises with its own current, the same cross inductance both ways, one current for one flux linkage.
     Import(Import),
     /// A page about a machine: its flux linkages, its currents, torque and power over speed, and what each limit costs.

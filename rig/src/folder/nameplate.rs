@@ -47,7 +47,7 @@ impl Nameplate {
         let mut ratings = Ratings::of(&map, &self.given)?;
         let contents = ratings.contents(&self.given, &self.told(), self.csv(&map))?;
         write::folder(&self.given.out, &contents)?;
-        ratings.say(&self.given)
+        ratings.say(&self.given, &[])
     }
 
     fn check(&self) -> Result<()> {

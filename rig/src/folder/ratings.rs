@@ -7,6 +7,7 @@ use crate::machine::Machine;
 use anyhow::{Result, ensure};
 use core::f64::consts::TAU;
 use std::fmt::Write as _;
+use tractive::time::Clock;
 use tractive_tablegen::{FluxMap, MachineFolder, Optimum, SmoothMap};
 
 /// Ratings that follow.
@@ -29,6 +30,10 @@ const RATED_TORQUE: f64 = 0.7;
 const RATED_SPEED: f64 = 1.05;
 /// Share of the largest speed below which no machine's full torque ends: its values are in other units.
 const ODD_CORNER: f64 = 0.02;
+/// Share of the largest speed that a machine's values are likely of other units where it cannot hold more.
+const ODD_SPEED: f64 = 0.1;
+/// The question that goes with such values.
+const UNITS: &str = "are inductances in H, flux linkages in Wb (a column psi_d [mWb] has thousandths)?";
 /// Ten minutes of full torque are the longest that a rotor may take to its largest speed.
 const LONGEST_S: f64 = 600.0;
 
@@ -121,15 +126,16 @@ impl Ratings {
         toml(&given.name(), &format!("machine {command}"), &lines)
     }
 
-    /// Says what the machine is: a few lines, or where it was asked for, JSON.
-    pub fn say(&self, given: &Given) -> Result<()> {
+    /// Says what the machine is, and what there is to note of its map: a few lines, or where it was asked for, JSON.
+    pub fn say(&self, given: &Given, notes: &[String]) -> Result<()> {
         if given.json {
             let mut ratings = serde_json::to_value(self)?;
             ratings["folder"] = serde_json::json!(given.out);
             ratings["name"] = given.name().into();
+            ratings["notes"] = notes.into();
             crate::say!("{ratings}");
         } else {
-            crate::say!("{}", self.told(given));
+            crate::say!("{}", [&[self.told(given)], notes].concat().join("\n"));
         }
         Ok(())
     }
@@ -146,8 +152,17 @@ impl Ratings {
         if *corner_rpm < ODD_CORNER * given.max_speed_rpm {
             let _ = write!(
                 text,
-                "\nfull torque ends at {:.1} % of the largest speed: are inductances in H, flux linkages in Wb?",
+                "\nfull torque ends at {:.1} % of the largest speed: {UNITS}",
                 100.0 * corner_rpm / given.max_speed_rpm
+            );
+        }
+        let control_hz = Clock::control_hz(given.max_switching_hz as f32);
+        if given.max_switching_hz > f64::from(control_hz) {
+            let _ = write!(
+                text,
+                "\na carrier of {} Hz wants control as often, which is {control_hz} Hz unless it is told: run and identify with --control-hz {:.0}",
+                given.max_switching_hz,
+                given.max_switching_hz.ceil()
             );
         }
         // Line to line, peak: what the diodes rectify.
@@ -178,7 +193,7 @@ fn of(said: Option<f64>, otherwise: &'static str) -> &'static str {
 }
 
 /// Four digits, not above the value.
-fn rounded_down(value: f64) -> f64 {
+pub fn rounded_down(value: f64) -> f64 {
     let unit = 10.0_f64.powi(value.abs().log10().floor() as i32 - 3);
     digits((value / unit + 1e-9).floor() * unit)
 }
@@ -218,8 +233,9 @@ fn check_speed(map: &SmoothMap, given: &Given) -> Result<()> {
         let middle = 0.5 * (low + high);
         if least_v(middle) <= given.voltage_v() { low = middle } else { high = middle }
     }
+    let hint = if low < ODD_SPEED * given.max_speed_rpm { format!("; {UNITS}") } else { String::new() };
     anyhow::bail!(
-        "--max-speed-rpm {}: must be at most {:.0}: above it no current within --max-current {} brings the machine's voltage down to what --udc {} gives",
+        "--max-speed-rpm {}: must be at most {:.0}: above it no current within --max-current {} brings the machine's voltage down to what --udc {} gives{hint}",
         given.max_speed_rpm,
         low.floor(),
         given.max_current,

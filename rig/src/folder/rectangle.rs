@@ -15,8 +15,8 @@ pub struct Rectangle {
     lines: Vec<u64>,
 }
 
-/// Currents this much apart, as a share of the axis, are the same one, rounded.
-const SAME: f64 = 1e-6;
+/// Currents this much apart, as a share of the axis, are the same one, rounded or found by an iteration.
+const SAME: f64 = 1e-4;
 /// Deviation from an even grid that is rounding, as a share of the step.
 const EVEN: f64 = 1e-3;
 
@@ -24,7 +24,7 @@ impl Rectangle {
     /// Of samples in any order.
     ///
     /// # Errors
-    /// The line of a node that is there twice, the currents of one that is missing, an axis with too few values.
+    /// The line of a node that is there twice with other values, the currents of one that is missing, an axis with too few values.
     pub fn of(samples: &[Sample], path: &Path) -> Result<Self> {
         let file = path.display();
         let (id_a, iq_a) = (axis(samples, 0), axis(samples, 1));
@@ -39,7 +39,8 @@ impl Rectangle {
         let mut nodes: Vec<Option<&Sample>> = vec![None; id_a.len() * columns];
         for sample in samples {
             let node = nearest(&id_a, sample.values[0]) * columns + nearest(&iq_a, sample.values[1]);
-            if let Some(twin) = nodes[node].replace(sample) {
+            let twin = nodes[node].replace(sample);
+            if let Some(twin) = twin.filter(|twin| twin.values != sample.values) {
                 let [id, iq, ..] = sample.values;
                 bail!(
                     "{file}:{}: id {id}, iq {iq}: must be there once: is in line {} too",
@@ -108,7 +109,7 @@ impl Rectangle {
                 let Some(before) = before else { continue };
                 ensure!(
                     values[node] > values[before],
-                    "{}:{}: {name}: {}: must rise with {current}, above {} of line {} (--d-axis, --negate)",
+                    "{}:{}: {name}: {}: must rise with {current}, above {} of line {}",
                     path.display(),
                     self.lines[node],
                     values[node],
@@ -193,7 +194,7 @@ impl Twins<'_> {
         }
         ensure!(
             !is_axis || node[1].abs() <= tolerance_wb,
-            "{file}:{line}: psi_q: {}: must be 0 at iq = 0 within {tolerance_wb:.2e} Wb, with d along the magnets (--d-axis)",
+            "{file}:{line}: psi_q: {}: must be 0 at iq = 0 within {tolerance_wb:.2e} Wb, with d along the magnets",
             node[1]
         );
         if is_axis {

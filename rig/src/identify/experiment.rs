@@ -4,14 +4,13 @@
 //! less `R ∫i dt` and the inverter's voltage error. All is linear in what is unknown: the terms of the co-energy, the resistance, the
 //! voltage error. What was before each part of the experiment is a constant of that part, and so each part counts from its mean.
 
-use super::basis::Basis;
 use super::boundary::{Boundary, turned};
 use super::check::turning;
 use super::corrected::turned_by;
-use super::equations::{Equations, Scope, by_boundary};
-use super::fit::Fit;
+use super::equations::{Scope, by_boundary, equations};
+use super::fit::{BESIDE, Fit};
 use super::half::{Half, add};
-use super::spread::BESIDE;
+use crate::coenergy::{Basis, Equations, Polynomial};
 use anyhow::{Result, ensure};
 use tractive::identification::Observation;
 
@@ -108,8 +107,8 @@ impl Experiment<'_> {
             }
         }
         let boundaries = self.boundaries(Some(&fit));
-        fit.still = self.still(&boundaries, &fit)?;
-        fit.terms = self.onward(&boundaries, &fit)?;
+        fit.still.terms = self.still(&boundaries, &fit)?;
+        fit.coenergy.terms = self.onward(&boundaries, &fit)?;
         fit.turning = turning(&boundaries, &fit);
         Ok(fit)
     }
@@ -121,7 +120,7 @@ impl Experiment<'_> {
         known: Option<&Fit>,
         scope: Scope,
     ) -> Equations {
-        let mut equations = Equations::of(boundaries, basis, known, scope);
+        let mut equations = equations(boundaries, basis, known, scope);
         equations.smooth(basis, 3, STRAIGHT * self.bound_a * self.bound_a);
         equations
     }
@@ -139,14 +138,13 @@ impl Experiment<'_> {
         let unknown = |place: usize| beside.get(place).copied().unwrap_or(f64::NAN);
         let more_rad = if known.is_some() { unknown(BESIDE) } else { 0.0 };
         Ok(Fit {
-            basis,
-            terms,
+            still: Polynomial { basis: basis.clone(), terms: Vec::new() },
+            coenergy: Polynomial { basis, terms },
             resistance_ohm: unknown(0),
             dead_time_s: unknown(1),
             threshold_v: unknown(2),
             zero_rad: known.map_or(0.0, |fit| fit.zero_rad) + more_rad.clamp(-MOST_RAD, MOST_RAD),
             residuals,
-            still: Vec::new(),
             turning: Vec::new(),
             spread: solution.spread,
         })
@@ -156,9 +154,9 @@ impl Experiment<'_> {
     /// whose straighter map tells them apart.
     fn onward(&self, boundaries: &[Boundary], fit: &Fit) -> Result<Vec<f64>> {
         let beside = [fit.resistance_ohm, fit.dead_time_s, fit.threshold_v];
-        let mut equations = Equations::of(boundaries, &fit.basis, None, Scope::All).given(&beside);
-        equations.smooth(&fit.basis, 4, ONWARD * self.bound_a.powi(3));
-        let [along_d, _] = fit.basis.flux((0.0, 0.0));
+        let mut equations = equations(boundaries, &fit.coenergy.basis, None, Scope::All).given(&beside);
+        equations.smooth(&fit.coenergy.basis, 4, ONWARD * self.bound_a.powi(3));
+        let [along_d, _] = fit.coenergy.basis.flux((0.0, 0.0));
         let magnet_wb = fit.flux(0.0, 0.0).0;
         equations.add(along_d.into_iter().map(|share| SURE * share), SURE * magnet_wb);
         Ok(equations.solve()?.unknowns)
@@ -166,11 +164,11 @@ impl Experiment<'_> {
 
     /// The terms that the pulses at standstill show: the magnets' flux linkage is no part of it, and stays what it is in the fit of all.
     fn still(&self, boundaries: &[Boundary], fit: &Fit) -> Result<Vec<f64>> {
-        let mut equations = self.equations(boundaries, &fit.basis, Some(fit), Scope::Pulses);
-        let [along_d, _] = fit.basis.flux((0.0, 0.0));
+        let mut equations = self.equations(boundaries, &fit.coenergy.basis, Some(fit), Scope::Pulses);
+        let [along_d, _] = fit.coenergy.basis.flux((0.0, 0.0));
         equations.add(along_d, fit.flux(0.0, 0.0).0);
         let mut terms = equations.solve()?.unknowns;
-        terms.truncate(fit.basis.len());
+        terms.truncate(fit.coenergy.basis.len());
         Ok(terms)
     }
 }

@@ -3,7 +3,6 @@
 //! The drive's own tasks run [`tractive::identification`] against a simulated machine; [`Fit`] makes a flux map, a resistance and a dead time of
 //! what they observe. What is known beforehand is what a nameplate tells: the keys of `machine.toml` but for resistance and inertia.
 
-mod basis;
 mod boundary;
 mod check;
 mod commander;
@@ -15,7 +14,6 @@ mod half;
 mod outcome;
 mod response;
 mod signs;
-mod spread;
 mod toml;
 mod turn;
 

@@ -30,6 +30,21 @@ pub const fn clock(control_hz: u32) -> Clock {
     Clock::new(TICKS_HZ, TICKS_HZ / control_hz)
 }
 
+/// The clock with the usual rate of control for devices that switch so often, in Hz.
+///
+/// # Errors
+/// Devices that switch more often than that.
+pub fn usual_clock(max_switching_hz: f32) -> anyhow::Result<Clock> {
+    let control_hz = Clock::control_hz(max_switching_hz);
+    // A carrier lasts a control period at least.
+    anyhow::ensure!(
+        max_switching_hz <= control_hz as f32,
+        "max_switching_hz {max_switching_hz}: must be at most {control_hz}, the rate of control of this command; run and identify take --control-hz {:.0}",
+        max_switching_hz.ceil()
+    );
+    Ok(clock(control_hz))
+}
+
 /// A time in µs in whole ticks of these timers.
 pub fn ticks(microseconds: f64) -> u32 {
     (microseconds * 1e-6 * f64::from(TICKS_HZ)).round() as u32

@@ -84,7 +84,7 @@ impl Drive {
     /// A machine that the drive would refuse at start-up.
     pub fn of(machine: Machine, without: Option<Ablation>) -> Result<Self> {
         let tables = without.map_or(machine.tables, |without| without.tables(machine.tables));
-        let clock = run::clock(Clock::control_hz(tables.ratings.max_switching_hz));
+        let clock = run::usual_clock(tables.ratings.max_switching_hz)?;
         let scale = Scale::of(&machine);
         let short_circuit_a =
             Stator::new(&machine.folder, &PlantSettings::default()).peak_on_flux_circle_a(0.0, 0.0);

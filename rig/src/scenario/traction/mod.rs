@@ -92,7 +92,8 @@ impl System for Traction {
         // A carrier lasts a control period at least.
         ensure!(
             (50.0..=f64::from(control_hz)).contains(&switching_hz),
-            "max_switching_hz {switching_hz}: must be from 50 to {control_hz}, the rate of control: see --control-hz"
+            "max_switching_hz {switching_hz}: must be from 50 to {control_hz}, the rate of control: --control-hz {:.0} goes with it",
+            switching_hz.ceil()
         );
         within(&[
             ("--dt", options.dt.unwrap_or(0.1), f64::from(clock.ticks_per_s).recip(), 0.1),

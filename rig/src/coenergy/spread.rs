@@ -2,9 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Unknowns beside the co-energy's terms: resistance, dead time, threshold.
-pub const BESIDE: usize = 3;
-
 /// The covariance of a solution: the triangular factor of its equations, the lengths of their columns, and the standard deviation of a row.
 #[derive(Clone, Debug)]
 pub struct Spread {
@@ -17,10 +14,16 @@ impl Spread {
     /// Standard error of a sum of the unknowns with these shares, those beyond being 0, as far as what is left of the samples is noise: each
     /// sample's own.
     pub fn error(&self, shares: &[f64]) -> f64 {
+        self.sigma * self.leverage(shares).norm()
+    }
+
+    /// The vector whose square is the weight of a row with these shares in its own estimate.
+    pub(super) fn leverage(&self, shares: &[f64]) -> DVector<f64> {
         let scaled = self.lengths.iter().enumerate();
         let scaled =
             scaled.map(|(k, length)| shares.get(k).map_or(0.0, |share| share / length)).collect::<Vec<_>>();
+        let count = scaled.len();
         let solved = self.factor.tr_solve_upper_triangular(&DVector::from_vec(scaled));
-        solved.map_or(f64::NAN, |solved| self.sigma * solved.norm())
+        solved.unwrap_or_else(|| DVector::from_element(count, f64::NAN))
     }
 }

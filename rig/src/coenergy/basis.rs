@@ -39,16 +39,16 @@ fn chebyshev<const N: usize, const K: usize>(x: f64) -> [[f64; K]; N] {
 impl Basis {
     /// For currents within a bound, in A.
     pub fn new(bound_a: f64) -> Self {
+        Self::over(MIDDLE_D * bound_a, WIDTH_D * bound_a, WIDTH_Q * bound_a)
+    }
+
+    /// Over a rectangle: along d its middle and its half width, along q its half width, in A.
+    pub fn over(middle_a: f64, width_d_a: f64, width_q_a: f64) -> Self {
         let below = |m: usize, n: usize| {
             m as f64 / MOST_D as f64 + n as f64 / MOST_Q as f64 <= 1.0 && (m, n) != (0, 0)
         };
         let all = (0..=MOST_D).flat_map(|m| (0..=MOST_Q).step_by(2).map(move |n| (m, n)));
-        Self {
-            middle_a: MIDDLE_D * bound_a,
-            width_d_a: WIDTH_D * bound_a,
-            width_q_a: WIDTH_Q * bound_a,
-            terms: all.filter(|(m, n)| below(*m, *n)).collect(),
-        }
+        Self { middle_a, width_d_a, width_q_a, terms: all.filter(|(m, n)| below(*m, *n)).collect() }
     }
 
     /// Terms.

@@ -1,0 +1,70 @@
+//! A map's own torque beside that of its flux linkages: what both tell of its units.
+
+/// Share by which the torques may differ: iron, friction and the teeth's ripple.
+const DIFFERENT: f64 = 0.1;
+/// The same of a ratio from a round number.
+const NEAR: f64 = 0.05;
+
+/// The factor that makes a column's values N·m; nothing where it is no torque.
+pub fn factor(name: &str) -> Option<f64> {
+    let letters: String = name.to_lowercase().chars().filter(|letter| letter.is_alphabetic()).collect();
+    let (before, unit) = letters.split_once("torque")?;
+    let known = ["", "shaft", "airgap", "electromagnetic", "em", "mean", "average", "avg"].contains(&before);
+    let unit = unit.trim_start_matches("avg").trim_start_matches("mean");
+    let sizes = [("", 1.0), ("nm", 1.0), ("mnm", 1e-3), ("knm", 1e3)];
+    sizes.into_iter().find(|(one, _)| known && *one == unit).map(|(_, size)| size)
+}
+
+/// The question that a map's torque asks where it is another than its flux linkages make with so many pole pairs. Rows are currents and flux linkages along
+/// d and q, and the torque; no number where there is none.
+pub fn question(
+    rows: impl Iterator<Item = ([f64; 4], f64)>,
+    pole_pairs: u32,
+    flux_factor: f64,
+) -> Option<String> {
+    let (mut told, mut made) = (0.0, 0.0);
+    for ([id, iq, psi_d, psi_q], torque_nm) in rows {
+        if torque_nm.is_finite() {
+            told += torque_nm.abs();
+            made += (1.5 * f64::from(pole_pairs) * flux_factor * (psi_d * iq - psi_q * id)).abs();
+        }
+    }
+    let ratio = told / made;
+    // Nor is it asked where there is no torque at all.
+    if told == 0.0 || !ratio.is_finite() || (ratio - 1.0).abs() <= DIFFERENT {
+        return None;
+    }
+    let root = 2.0_f64.sqrt();
+    let questions = [
+        (2.0, "are its currents and flux linkages rms (--rms)"),
+        (root, "are its currents rms, or its flux linkages"),
+        (1.0 / root, "are its currents peak, or its flux linkages"),
+        (0.5, "are its currents and flux linkages peak"),
+    ];
+    let near = questions.into_iter().find(|(round, _)| (ratio / round - 1.0).abs() <= NEAR);
+    let question = near.map_or("is --pole-pairs right, and --flux-factor", |(_, question)| question);
+    Some(format!(
+        "the map's own torque is {ratio:.2} times that of its currents and flux linkages with {pole_pairs} pole pairs: {question}?"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn torque_is_told_from_other_columns() {
+        for (name, size) in [
+            ("Torque [Nm]", Some(1.0)),
+            ("Shaft Torque", Some(1.0)),
+            ("torque_kNm", Some(1e3)),
+            ("Torque avg (N.m)", Some(1.0)),
+            ("Torque ripple [%]", None),
+            ("Torque per volume", None),
+            ("max torque", None),
+            ("T [°C]", None),
+        ] {
+            assert_eq!(factor(name), size, "{name}");
+        }
+    }
+}
