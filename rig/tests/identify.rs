@@ -1,6 +1,7 @@
 //! Machines identified by their own drive, and how far what comes out is from the truth.
 
 mod linear;
+mod nameplate;
 
 use clap::{Args, FromArgMatches};
 use linear::MACHINES;
@@ -649,6 +650,27 @@ fn limited(name: &str, least_a: f64, place: &Path) -> Machine {
     )
     .unwrap();
     Machine::load(folder.to_str().unwrap()).unwrap()
+}
+
+#[test]
+fn a_light_rotor_that_turns_away_is_told_what_it_needs() {
+    let folder = nameplate::made(
+        "--pole-pairs 4 --rs 1.1 --ld 0.0055 --lq 0.0065 --psi-f 0.155 --max-current 35 --udc 560 --max-speed-rpm 6000 --max-switching-hz 8000 --inertia 0.0008",
+    );
+    let place = tempfile::tempdir().unwrap();
+    let run = |more: &[&str]| {
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
+        rig.args(["identify", "--machine"]).arg(folder.path()).arg("--out").arg(place.path().join("found"));
+        rig.arg("--page").arg(place.path().join("found.html")).args(more).output().unwrap()
+    };
+    let alone = run(&[]);
+    let said = String::from_utf8_lossy(&alone.stderr);
+    assert!(alone.status.code() == Some(1) && said.starts_with("fault rotor_turned"), "{said}");
+    assert!(
+        said.contains("couple it") && said.contains("--inertia") && said.trim().lines().count() == 1,
+        "{said}"
+    );
+    assert_eq!(run(&["--inertia", "0.003"]).status.code(), Some(0));
 }
 
 #[test]

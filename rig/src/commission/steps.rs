@@ -70,7 +70,7 @@ const LEAST_ZERO_DEG: f64 = 2.0;
 const PHASE_SUM: &str = Fault::PhaseSum.name();
 const ADVICE_SUM: &str = "current sensors: one or two have the wrong sign, so that what they read does not add up to zero: exchange the leads of \
     one after the other and begin anew";
-const ADVICE_TURNED: &str = "a load turns the rotor; or its angle counts the wrong way: with the gates off turn the rotor forward, and where \
+const ADVICE_TURNED: &str = "a load turns the rotor; or it is light and swings under the pulses: couple it to what it drives; or its angle counts the wrong way: with the gates off turn the rotor forward, and where \
     speed_rpm is below 0 exchange the encoder's channels A and B or two phases; or its zero is far off: set the power stage's \
     encoder_zeros_deg anew";
 

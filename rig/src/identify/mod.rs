@@ -79,7 +79,7 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
     let outcome = match identified(identify, &machine)? {
         Ok(outcome) => outcome,
         Err(Ended { fault, value, limit, .. }) => {
-            eprintln!("fault {fault}: {value} (limit {limit}): nothing is written");
+            eprintln!("fault {fault}: {value} (limit {limit}): nothing is written{}", remedy(&fault));
             return Ok(ExitCode::from(1));
         }
     };
@@ -93,6 +93,16 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
         crate::say!("machine folder: {}\nreport: {}", out.display(), page.display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What an experiment needs that has ended with a fault, in words behind others.
+fn remedy(fault: &str) -> &'static str {
+    match fault {
+        ROTOR_TURNED => {
+            "; a light rotor swings under the pulses: couple it to what it drives (of a simulated one --inertia); else a load turns it, or its angle is wrong, of which commission tells more"
+        }
+        _ => "",
+    }
 }
 
 /// Least share of the largest current that pulses against the magnets' flux must be allowed: with less a rotor turns away.
