@@ -95,7 +95,7 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What an experiment needs that has ended with a fault, in words behind others.
+/// Remedy of an experiment that has ended with a fault, in words behind others.
 fn remedy(fault: &str) -> &'static str {
     match fault {
         ROTOR_TURNED => {

@@ -55,6 +55,11 @@ pub(crate) fn refused(refused: Refused) -> anyhow::Error {
     let option = match refused.name.rsplit('.').next() {
         Some("dead_time_ticks") => " (--dead-time-us)",
         Some("min_pulse_ticks") => " (--min-pulse-us)",
+        Some("max_acceleration_rad_s2") => {
+            return anyhow::anyhow!(
+                "configuration refused: {refused}, electrical, of max_torque_nm on rotor_inertia_kg_m2: control follows no lighter rotor at its rate, see --control-hz"
+            );
+        }
         _ => return anyhow::anyhow!("configuration refused: {refused}"),
     };
     anyhow::anyhow!("configuration refused: {refused}{option}, {} a µs", TICKS_HZ / 1_000_000)
