@@ -412,5 +412,6 @@ fn within(share: f32, most: f32) -> f32 {
 
 fn dot(a: Unknown, b: Unknown) -> f32 {
     let ([a0, a1, a2], [b0, b1, b2]) = (a, b);
-    a0 * b0 + a1 * b1 + a2 * b2
+    let flux = a0 * b0 + a1 * b1;
+    flux + a2 * b2
 }

@@ -203,6 +203,7 @@ fn ratings_of_a_machine() {
         (ratings.trip_dc_under_v, 212.5),
         (ratings.trip_speed_rad_s, 345.575_192),
         (ratings.torque_slew_nm_s, 220.0),
+        (ratings.max_acceleration_rad_s2, f64::from(parameters.pole_pairs) * 22.0 * 314.159_265 / 22.0),
     ] {
         near(value.into(), expected, 1e-6);
     }
