@@ -23,8 +23,8 @@ const STILL_S: f32 = 0.1;
 const STILL: Angle = Angle(11_930_465);
 /// Turn that begins the law anew: 3°.
 const TURNED: Angle = Angle(35_791_394);
-/// Turn that shows which way a push goes: 2°.
-const PUSHED: Angle = Angle(23_860_929);
+/// Turn that shows which way a push goes: 2°, electrical.
+pub const PUSHED: Angle = Angle(23_860_929);
 
 /// Current along −d whose flux linkage a pulse has, as a share of the largest.
 pub const PULSE_SHARE: f32 = 0.3;
@@ -35,8 +35,9 @@ const PULSES: u32 = 96;
 /// Most commands that build up a pulse.
 const LONGEST: f32 = 32.0;
 
-/// Current of a push, as a share of the largest; its longest time, in s; and commands without current after it.
-const PUSH_SHARE: f32 = 0.1;
+/// Current of a push along q, as a share of the largest.
+pub const PUSH_SHARE: f32 = 0.1;
+/// Longest time of a push, in s; and commands without current after it.
 const PUSH_S: f32 = 0.5;
 const REST: u32 = 20;
 /// Share of the way to a push's current that a command goes, by the mean of both axes' inverse inductances.
@@ -46,7 +47,7 @@ const MEND_SHARE: f32 = 0.7;
 /// Most rounds in which what drift is left is taken away.
 const MENDS: u32 = 4;
 
-/// `B` over `A` from which there is an axis.
+/// Ratio `B` over `A`, (L_q − L_d)/(L_q + L_d) of the inductances, from which there is an axis.
 pub const SALIENT: f32 = 0.03;
 /// Share of the currents' way along the pulses that shows the polarity.
 const POLAR_SHARE: f32 = 0.02;

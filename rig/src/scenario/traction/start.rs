@@ -11,6 +11,7 @@ use crate::steps::held;
 use crate::verdict::bound;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
+use tractive::start_up::{PUSH_SHARE, PUSHED};
 
 /// See the module.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -40,7 +41,7 @@ const JUDGED_S: (f64, f64) = (0.15, 0.01);
 /// The time that torque takes from an angle that is found later on.
 const COMES_S: f64 = 0.05;
 const REST_S: f64 = 0.1;
-/// Lengths of a push, of a tenth of the largest torque over 2°, in which the polarity is found, and the time that is there for them anyway.
+/// Lengths of a push in which the polarity is found, and the time that is there for them anyway.
 const PUSHES: f64 = 16.0;
 const USUAL_PUSHES_S: f64 = 0.3;
 
@@ -54,7 +55,8 @@ struct Torque {
 impl Torque {
     fn of(ratings: &Ratings) -> Self {
         let acceleration = f64::from(ratings.max_acceleration_rad_s2);
-        let push_s = (2.0 * 2.0_f64.to_radians() / (0.1 * acceleration)).sqrt();
+        let push_s =
+            (2.0 * f64::from(PUSHED.signed_radians()) / (f64::from(PUSH_SHARE) * acceleration)).sqrt();
         let from_s = TORQUE_S.0 + (PUSHES * push_s - USUAL_PUSHES_S).max(0.0);
         let fast_rad_s = SPEED_SHARE * f64::from(ratings.pole_pairs * ratings.max_speed_rad_s);
         let share = TORQUE_SHARE.min(fast_rad_s / (acceleration * TORQUE_S.1));
@@ -120,7 +122,11 @@ impl Scenario<Traction> for Start {
             Verdict::never("drive tripped", recording.trip().is_some()),
             Verdict::at_most("angle off, electrical, in degrees", error_deg.map(f64::abs), 5.0),
             Verdict::at_most("turned backward, mechanical, in degrees", backward_deg, 5.0),
-            Verdict::at_most("mean torque off the demand (share)", torque_error, bound(options, 0.01, 0.02)),
+            Verdict::at_most(
+                "mean torque off the demand (share of a fifth of the largest)",
+                torque_error,
+                bound(options, 0.01, 0.02),
+            ),
         ]);
         line::figures(&mut figures, recording);
         figures.set("verdicts", verdicts);
