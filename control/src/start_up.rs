@@ -8,10 +8,11 @@
 //! 3. **Polarity**: magnets saturate the iron along +d, so that a pulse there takes more current than one along −d. Over all directions the currents
 //!    of the pulses add up to nothing but that. A machine without magnets has none to be found. Where the map says that the iron saturates along −d,
 //!    as the bridges of some reluctance machines do, the currents are not believed.
-//! 4. **Push**: a machine whose currents do not show it shows its polarity by turning: a current along q moves the rotor by half a degree or so,
-//!    and the opposite current stops it again; so do shorter ones what drift is left.
+//! 4. **Push**: a machine whose currents do not show it shows its polarity by turning: a current along q grows until the rotor has moved by half a degree
+//!    or so more than it drifts, and then brakes it.
 //!
-//! The rotor swings by a fraction of a degree meanwhile; a rotor that is turned begins the law anew.
+//! Currents and voltages are seen from the rotor: one that is heavy swings by a fraction of a degree meanwhile, one that is light by some degrees.
+//! A rotor that is turned farther begins the law anew.
 
 #![forbid(unsafe_code)]
 
@@ -21,9 +22,9 @@ use crate::machine::{Ratings, Tables};
 /// Time for which the rotor has to stand still, in s, and what counts as still, electrical: 1°.
 const STILL_S: f32 = 0.1;
 const STILL: Angle = Angle(11_930_465);
-/// Turn that begins the law anew: 3°.
-const TURNED: Angle = Angle(35_791_394);
-/// Turn that shows which way a push goes: 2°, electrical.
+/// Turn that begins the law anew: 10°.
+const TURNED: Angle = Angle(119_304_647);
+/// Turn that shows which way a push goes, electrical: 2°.
 pub const PUSHED: Angle = Angle(23_860_929);
 
 /// Current along −d whose flux linkage a pulse has, as a share of the largest.
@@ -35,17 +36,23 @@ const PULSES: u32 = 96;
 /// Most commands that build up a pulse.
 const LONGEST: f32 = 32.0;
 
-/// Current of a push along q, as a share of the largest.
-pub const PUSH_SHARE: f32 = 0.1;
-/// Longest time of a push, in s; and commands without current after it.
+/// Growth of a push's current along q, in shares of the largest per s; and the longest time of a push, in s.
+pub const PUSH_GROWTH_HZ: f32 = 1.0;
 const PUSH_S: f32 = 0.5;
-const REST: u32 = 20;
+/// Time without current in which the drift before a push shows, in s.
+const REST_S: f32 = 0.02;
+/// Length of the brake's memory of the turn as a share of the push's; what is left of [`PUSHED`] beyond that memory where the rotor stands again, and the
+/// most of the push's lengths until then.
+const BRAKE_SHARE: f32 = 0.25;
+const BRAKED: Angle = Angle(PUSHED.0 / 64);
+const BRAKES: u32 = 4;
+/// Share of the push's last current with which a turn of [`PUSHED`] beyond that memory is braked. A push `k t` takes `t` to `θ = k t³/6`; a rotor that is braked
+/// by `g` times its turn beyond a memory of length `T` does not swing up to `g = 1/4T²`, in units of its acceleration, which is ⅔ of `k t` over `θ` for a quarter of `t`.
+const BRAKE_GAIN: f32 = 2.0 / 3.0;
 /// Share of the way to a push's current that a command goes, by the mean of both axes' inverse inductances.
 const LEAD_SHARE: f32 = 0.2;
-/// Share of a drift that a mend takes away: a push's current lags, so that it would be up to twice the drift.
-const MEND_SHARE: f32 = 0.7;
-/// Most rounds in which what drift is left is taken away.
-const MENDS: u32 = 4;
+/// Share of that which later commands keep, for what resistance and devices take.
+const HELD_SHARE: f32 = 0.1;
 
 /// Ratio `B` over `A`, (L_q − L_d)/(L_q + L_d) of the inductances, from which there is an axis.
 pub const SALIENT: f32 = 0.03;
@@ -57,8 +64,6 @@ const BENT_SHARE: f32 = 0.02;
 /// Everything that a command is made of.
 #[derive(Clone, Copy, Debug)]
 pub struct StartUpInput<'a> {
-    /// Turn of the rotor since its sensor began to count, electrical.
-    pub turned: Angle,
     /// Largest voltage, peak phase, in V.
     pub limit_v: f32,
     /// Time for which a command acts, in s, greater than zero.
@@ -88,29 +93,30 @@ enum Stage {
     /// No voltage while the gates come on.
     Lead,
     Axis,
+    Rest,
     Push,
-    Stop,
-    Drift,
-    Mend,
+    Brake,
 }
 
 /// The law's state.
 #[derive(Clone, Copy, Debug)]
 pub struct StartUp {
     stage: Stage,
-    /// Time that the rotor has stood still, in s; and where it stood.
+    /// Time that the rotor has stood still, in s; turn where it stood, and now.
     still_s: f32,
     from: Angle,
-    /// Commands of this pulse or push; pulses; commands of the first push and of the newest mend, and how many mends there were.
+    turned: Angle,
+    /// Turn where this stage began, or the brake's memory of it.
+    stage_from: Angle,
+    /// Commands of this pulse, push or rest; and pulses.
     commands: u32,
     pulses: u32,
-    pushes: u32,
-    mend: u32,
-    mends: u32,
-    /// Turn where the push began, or the drift after it; whether the rotor went backward under the push, and whether it drifts as it went.
-    pushed_from: Angle,
+    /// Turn of a command by which the rotor drifts before the push, in units of [`Angle`]; commands of the push, and whether it went backward.
+    drift: i32,
+    pushed: u32,
     against: bool,
-    drifts_on: bool,
+    /// Voltage that holds the push's current, in V.
+    held_v: AlphaBeta,
     /// Commands that build the pulse up, and its flux linkage in Wb.
     halves: u32,
     pulse_wb: f32,
@@ -137,14 +143,14 @@ impl StartUp {
             stage: Stage::Still,
             still_s: 0.0,
             from: Angle::ZERO,
+            turned: Angle::ZERO,
+            stage_from: Angle::ZERO,
             commands: 0,
             pulses: 0,
-            pushes: 0,
-            mend: 0,
-            mends: 0,
-            pushed_from: Angle::ZERO,
+            drift: 0,
+            pushed: 0,
             against: false,
-            drifts_on: false,
+            held_v: NONE,
             halves: 0,
             pulse_wb: 0.0,
             before: NONE,
@@ -167,10 +173,13 @@ impl StartUp {
 
     /// Takes the current at a carrier boundary, in A, and the volt-seconds since the last one, in V·s; `None` where they are not known.
     pub fn observe(&mut self, current: AlphaBeta, volt_seconds: Option<AlphaBeta>) {
-        let (change, twice) = (current - self.before, current + self.before);
+        let change = current - self.before;
+        let twice = current + self.before;
         self.before = current;
         self.flux = self.flux + volt_seconds.unwrap_or_default();
         let Some(flux) = volt_seconds.filter(|_| self.stage == Stage::Axis) else { return };
+        let back = (self.from - self.turned).sin_cos();
+        let [change, twice, flux] = [change, twice, flux].map(|vector| vector.turned(back));
         self.salient = self.salient + times(change, flux);
         self.uneven = self.uneven + times(flux, flux);
         self.round += change.dot(flux);
@@ -185,13 +194,13 @@ impl StartUp {
         }
     }
 
-    /// A control period without a command, `passed_s` after the last one.
-    pub fn wait(&mut self, turned: Angle, passed_s: f32) {
+    /// Takes the turn of the rotor since its sensor began to count, electrical, `passed_s` after the last one.
+    pub fn turn(&mut self, turned: Angle, passed_s: f32) {
         self.still_s += passed_s;
+        self.turned = turned;
         let limit = if self.is_waiting() { STILL } else { TURNED };
-        let searches = matches!(self.stage, Stage::Still | Stage::Lead | Stage::Axis);
-        if searches && off(turned - self.from) > limit.0 {
-            *self = Self { from: turned, ..Self::new() };
+        if off(turned - self.stage_from) > limit.0 {
+            *self = Self { from: turned, turned, stage_from: turned, ..Self::new() };
         }
     }
 
@@ -207,7 +216,7 @@ impl StartUp {
             }
             Stage::Lead => self.begin(Stage::Axis),
             Stage::Axis => {}
-            Stage::Push | Stage::Stop | Stage::Drift | Stage::Mend => return self.push(input),
+            Stage::Rest | Stage::Push | Stage::Brake => return self.push(input),
         }
         if self.stage == Stage::Lead {
             return nothing;
@@ -217,7 +226,6 @@ impl StartUp {
         }
         if self.commands == 2 * self.halves {
             (self.commands, self.pulses) = (0, self.pulses + 1);
-            self.pushed_from = input.turned;
             if self.pulses == PULSES
                 && let Some(ends) = self.judge(input.tables)
             {
@@ -268,52 +276,55 @@ impl StartUp {
         if polar_a * polar_a * self.squared > way * way * self.count && !saturates_backward(tables) {
             return Some(self.found(polar_a < 0.0));
         }
-        self.begin(Stage::Push);
+        self.begin(Stage::Rest);
         None
     }
 
     fn begin(&mut self, stage: Stage) {
-        (self.stage, self.commands, self.pulses) = (stage, 0, 0);
+        (self.stage, self.commands, self.pulses, self.stage_from) = (stage, 0, 0, self.turned);
     }
 
-    /// A command of the push.
+    /// A command of the push, of the rest before it or of the brake after it.
     fn push(&mut self, input: &StartUpInput) -> StartUpStep {
-        let moved = input.turned - self.pushed_from;
+        let moved = self.turned - self.stage_from;
         self.commands += 1;
-        match self.stage {
-            Stage::Push if off(moved) > PUSHED.0 => {
-                (self.pushes, self.against) = (self.commands, moved.signed() < 0);
-                self.begin(Stage::Stop);
-            }
-            Stage::Push if self.commands as f32 * input.interval_s > PUSH_S => return StartUpStep::Failed,
-            Stage::Stop if self.commands >= self.pushes => self.begin(Stage::Drift),
-            Stage::Drift if self.commands == REST => self.pushed_from = input.turned,
-            Stage::Drift if self.commands >= REST + self.pushes => {
-                // The push gave twice its mean speed, and took as long.
-                let share = off(moved) as f32 * (0.5 * MEND_SHARE / PUSHED.0 as f32);
-                self.drifts_on = (moved.signed() < 0) == self.against;
-                self.mend = (self.pushes as f32 * share) as u32;
-                if self.mend == 0 || self.mends == MENDS {
-                    return self.found(self.against);
-                }
-                self.mends += 1;
-                self.begin(Stage::Mend);
-            }
-            Stage::Mend if self.commands > self.mend => self.begin(Stage::Drift),
-            _ => {}
-        }
+        let growth = PUSH_GROWTH_HZ * input.interval_s;
+        let passed_s = input.interval_s * self.commands as f32;
         let share = match self.stage {
-            Stage::Push => PUSH_SHARE,
-            Stage::Stop => -PUSH_SHARE,
-            Stage::Mend if self.drifts_on => -PUSH_SHARE,
-            Stage::Mend => PUSH_SHARE,
-            Stage::Still | Stage::Lead | Stage::Axis | Stage::Drift => 0.0,
+            Stage::Push if passed_s > PUSH_S => return StartUpStep::Failed,
+            Stage::Push => {
+                let drifted = (self.commands as i32).wrapping_mul(self.drift);
+                let pushed = moved - Angle(drifted as u32);
+                if off(pushed) > PUSHED.0 {
+                    (self.pushed, self.against) = (self.commands, pushed.signed() < 0);
+                    (self.stage, self.commands) = (Stage::Brake, 0);
+                }
+                PUSH_GROWTH_HZ * passed_s
+            }
+            Stage::Brake if off(moved) < BRAKED.0 || self.commands > BRAKES * self.pushed => {
+                return self.found(self.against);
+            }
+            Stage::Brake => {
+                let pushed = self.pushed as f32;
+                let beyond = moved.signed() as f32;
+                let forgotten = (beyond / (1.0 + BRAKE_SHARE * pushed)) as i32;
+                self.stage_from = self.stage_from + Angle(forgotten as u32);
+                let share = BRAKE_GAIN / PUSHED.0 as f32 * beyond * (growth * pushed);
+                if self.against { share } else { -share }
+            }
+            _ if passed_s > REST_S => {
+                self.drift = moved.signed() / self.commands as i32;
+                self.begin(Stage::Push);
+                0.0
+            }
+            _ => 0.0,
         };
-        let wanted = along(self.axis + Angle::DEG_90) * (share * input.tables.ratings.max_current_a);
+        let across = self.axis + (self.turned - self.from) + Angle::DEG_90;
+        let wanted = along(across) * (share * input.tables.ratings.max_current_a);
         let lead_ohm = LEAD_SHARE * self.squared / (self.round * input.interval_s);
-        StartUpStep::Pulse(
-            (wanted - self.before) * lead_ohm + wanted * input.tables.ratings.stator_resistance_ohm,
-        )
+        let led_v = (wanted - self.before) * lead_ohm;
+        self.held_v = self.held_v + led_v * HELD_SHARE;
+        StartUpStep::Pulse(led_v + self.held_v)
     }
 
     /// Found, with d along the axis or against it.

@@ -44,10 +44,9 @@ fn tables(magnets: bool) -> Tables {
 /// The law's answer, the largest flux linkage of its pulses, in Wb, and whether it has pushed the rotor: its pulses alone take some three hundred commands.
 fn answer(rotor: &Rotor, tables: &Tables, alike: usize) -> (StartUpStep, f32, bool) {
     let (mut law, mut flux, mut largest_wb) = (StartUp::new(), AlphaBeta::default(), 0.0_f32);
-    law.wait(Angle::ZERO, 0.2);
+    law.turn(Angle::ZERO, 0.2);
     for command in 0..10_000 {
         let input = StartUpInput {
-            turned: Angle::ZERO,
             limit_v: 1_600.0,
             interval_s: 1.5 * HALF_S,
             committed: AlphaBeta::default(),

@@ -91,28 +91,32 @@ const NAMEPLATES: [&str; 8] = [
 fn machines_of_a_nameplate_start_from_any_angle() {
     NAMEPLATES.par_iter().for_each(|values| {
         let folder = made(values);
-        starts_of(values, &folder, None);
+        starts_of(values, &folder, "", 0.5);
     });
 }
 
-/// A servo motor by itself. Its drift after the pushes, of some 10° a second, goes on for as long as nothing brakes it, which in the rig nothing does; where its index
-/// passes while it swings, that swing.
+/// A servo motor by itself, whose bearings hold 1 % of its torque, a gear a fifth. With flaws it swings by more than 3° (electrical) under the pulses; pulses that were
+/// not seen from the rotor began anew at each, and never ended.
 #[test]
-fn a_light_rotor_starts() {
+fn a_light_rotor_starts_however_it_is_held() {
     let values = "--pole-pairs 4 --rs 1.1 --ld 0.0055 --lq 0.0065 --psi-f 0.155 --max-current 35 --udc 560 --max-speed-rpm 6000 --max-switching-hz 8000 \
         --inertia 0.0008";
-    starts_of(values, &made(values), Some("turned backward"));
+    let folder = made(values);
+    for (flaws, most_deg) in
+        [("--friction 0.3", 0.5), ("--friction 6.6", 0.5), ("--friction 0.3 --real", 5.0)]
+    {
+        starts_of(values, &folder, flaws, most_deg);
+    }
 }
 
-/// Starts from several angles, that keep their bounds, all but one.
-fn starts_of(values: &str, folder: &TempDir, but: Option<&str>) {
+/// Starts from several angles, that keep their bounds and find the angle to so many degrees.
+fn starts_of(values: &str, folder: &TempDir, flaws: &str, most_deg: f64) {
     for from_deg in [0.0, 77.0, 200.0, 311.0] {
-        let line = format!("start --machine {} --from-deg {from_deg}", folder.path().display());
-        let (recording, mut broken) = run(&line);
-        broken.retain(|verdict| but.is_none_or(|but| !verdict.contains(but)));
-        assert!(broken.is_empty(), "{values} from {from_deg}°: {broken:?}");
+        let line = format!("start --machine {} --from-deg {from_deg} {flaws}", folder.path().display());
+        let (recording, broken) = run(&line);
+        assert!(broken.is_empty(), "{values} {flaws} from {from_deg}°: {broken:?}");
         let off_deg = recording.found.map_or(0.0, |found| found.error_deg.abs());
-        assert!(off_deg < 0.5, "{values} from {from_deg}°: {off_deg}°");
+        assert!(off_deg < most_deg, "{values} {flaws} from {from_deg}°: {off_deg}°");
     }
 }
 

@@ -11,7 +11,7 @@ use crate::steps::held;
 use crate::verdict::bound;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
-use tractive::start_up::{PUSH_SHARE, PUSHED};
+use tractive::start_up::{PUSH_GROWTH_HZ, PUSHED};
 
 /// See the module.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
@@ -41,9 +41,9 @@ const JUDGED_S: (f64, f64) = (0.15, 0.01);
 /// The time that torque takes from an angle that is found later on.
 const COMES_S: f64 = 0.05;
 const REST_S: f64 = 0.1;
-/// Lengths of a push in which the polarity is found, and the time that is there for them anyway.
-const PUSHES: f64 = 16.0;
-const USUAL_PUSHES_S: f64 = 0.3;
+/// Lengths of a push in which the polarity is found, with the brake after it, and the time that is there for them anyway.
+const PUSHES: f64 = 5.0;
+const USUAL_PUSHES_S: f64 = 0.2;
 
 /// The torque's course: from when until when in s, and how much of the largest it is.
 struct Torque {
@@ -55,8 +55,8 @@ struct Torque {
 impl Torque {
     fn of(ratings: &Ratings) -> Self {
         let acceleration = f64::from(ratings.max_acceleration_rad_s2);
-        let push_s =
-            (2.0 * f64::from(PUSHED.signed_radians()) / (f64::from(PUSH_SHARE) * acceleration)).sqrt();
+        let growth_rad_s3 = f64::from(PUSH_GROWTH_HZ) * acceleration;
+        let push_s = (6.0 * f64::from(PUSHED.signed_radians()) / growth_rad_s3).cbrt();
         let from_s = TORQUE_S.0 + (PUSHES * push_s - USUAL_PUSHES_S).max(0.0);
         let fast_rad_s = SPEED_SHARE * f64::from(ratings.pole_pairs * ratings.max_speed_rad_s);
         let share = TORQUE_SHARE.min(fast_rad_s / (acceleration * TORQUE_S.1));

@@ -47,7 +47,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let clock = self.settings.clock;
         let now = self.now.before(clock.control_ticks);
         let starting = &mut self.starting;
-        starting.law.wait(turned, clock.control_s());
+        starting.law.turn(turned, clock.control_s());
         if let Some(newest) = self.pulses.newest()
             && starting.boundary != Some(newest.at)
         {
@@ -65,7 +65,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             let interval_s = if shortest_s < clock.control_s() { clock.control_s() } else { shortest_s };
             let tables = self.machine.tables();
             let committed = self.pulses.committed_volt_ticks() * (sample.udc_v * clock.tick_s);
-            match starting.law.step(&StartUpInput { turned, limit_v, interval_s, committed, tables }) {
+            match starting.law.step(&StartUpInput { limit_v, interval_s, committed, tables }) {
                 StartUpStep::Wait => return false,
                 StartUpStep::Pulse(wanted) => vector = wanted,
                 StartUpStep::Found(zero) => {
