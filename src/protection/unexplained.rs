@@ -32,14 +32,14 @@ impl UnexplainedWatch {
         Self { excess_wb: 0.0 }
     }
 
-    /// A boundary has passed after a half of so many seconds, with a voltage that is left unexplained, in V, rotor frame, at an electrical speed in
-    /// rad/s.
+    /// A boundary has passed after a half of so many seconds, with a voltage that is left unexplained, in V, rotor frame, of which a dead time that is told may
+    /// take so much, at an electrical speed in rad/s.
     #[inline(always)]
-    pub fn step(&mut self, unexplained_v: Dq, omega: f32, half_s: f32, tables: &Tables) {
+    pub fn step(&mut self, unexplained_v: Dq, dead_v: f32, omega: f32, half_s: f32, tables: &Tables) {
         let ratings = &tables.ratings;
         let still_v = DROP_SHARE * ratings.stator_resistance_ohm * ratings.max_current_a
             + LINK_SHARE * ratings.dc_link_nominal_v;
-        let may_be_v = still_v + EMF_SHARE * full_flux_wb(tables) * omega.abs();
+        let may_be_v = still_v + dead_v + EMF_SHARE * full_flux_wb(tables) * omega.abs();
         let excess_wb = self.excess_wb + (unexplained_v.length() - may_be_v) * half_s;
         // What is not a number is found elsewhere.
         self.excess_wb = if excess_wb > 0.0 { excess_wb } else { 0.0 };
@@ -69,11 +69,11 @@ mod tests {
 
     const HALF_S: f32 = 0.5e-3;
 
-    /// The halves until a voltage of the machine with these tables is a fault, in V at an electrical speed in rad/s; `None` of 2,000.
-    fn found_after(unexplained_v: f32, omega: f32, tables: &Tables) -> Option<u32> {
+    /// The halves until a voltage of the machine with these tables, of which a dead time may take a part, is a fault, in V at an electrical speed in rad/s; `None` of 2,000.
+    fn found_after(unexplained_v: f32, dead_v: f32, omega: f32, tables: &Tables) -> Option<u32> {
         let mut watch = UnexplainedWatch::new();
         (1..2_000).find(|_| {
-            watch.step(Dq { d: 0.0, q: unexplained_v }, omega, HALF_S, tables);
+            watch.step(Dq { d: 0.0, q: unexplained_v }, dead_v, omega, HALF_S, tables);
             watch.check(tables).is_some()
         })
     }
@@ -86,14 +86,16 @@ mod tests {
                 tables.ratings;
             let (drop_v, flux_wb) = (stator_resistance_ohm * max_current_a, full_flux_wb(tables));
             for omega in [0.0, 100.0, -800.0_f32] {
-                let may_be_v = 0.8 * drop_v + 0.01 * dc_link_nominal_v + 0.25 * flux_wb * omega.abs();
-                assert_eq!(found_after(0.999 * may_be_v, omega, tables), None, "{omega} rad/s");
+                let dead_v = 7.0;
+                let may_be_v =
+                    dead_v + 0.8 * drop_v + 0.01 * dc_link_nominal_v + 0.25 * flux_wb * omega.abs();
+                assert_eq!(found_after(0.999 * may_be_v, dead_v, omega, tables), None, "{omega} rad/s");
                 // A volt more for so long that it is a fifth of the flux linkage.
-                let halves = found_after(may_be_v + 1.0, omega, tables).unwrap();
+                let halves = found_after(may_be_v + 1.0, dead_v, omega, tables).unwrap();
                 assert!((halves as f32 * HALF_S / (0.2 * flux_wb) - 1.0).abs() < 0.01, "{halves} halves");
             }
             let turning = 500.0;
-            let halves = found_after(magnet_flux_wb * turning, 0.0, tables).unwrap();
+            let halves = found_after(magnet_flux_wb * turning, 0.0, 0.0, tables).unwrap();
             assert!(halves as f32 * HALF_S * turning < core::f32::consts::PI, "{halves} halves");
         }
     }
@@ -103,7 +105,7 @@ mod tests {
     fn volt_seconds_beyond_it_add_up_and_are_forgotten() {
         let (limit_wb, mut watch) = (0.2 * full_flux_wb(&BUILT_IN), UnexplainedWatch::new());
         let mut step = |volts: f32| {
-            watch.step(Dq { d: volts, q: 0.0 }, 0.0, HALF_S, &BUILT_IN);
+            watch.step(Dq { d: volts, q: 0.0 }, 0.0, 0.0, HALF_S, &BUILT_IN);
             watch.check(&BUILT_IN)
         };
         for _ in 0..20 {

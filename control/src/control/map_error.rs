@@ -37,8 +37,6 @@ const LINK_NOISE: f32 = 3e-3;
 const EMF_NOISE: f32 = 4e-3;
 /// EMF over what the dead time may take from which it tells of the flux linkage.
 const TELLING: f32 = 6.0;
-/// Part of what the dead time may take where the signs of all currents are known.
-const SURE: f32 = 0.2;
 /// Part of what the dead time takes that says nothing.
 const UNSAID: f32 = 0.25;
 /// Standard deviations of a voltage that is learnt from: an inverter or a link with a fault has more, and is no error of the machine.
@@ -145,16 +143,19 @@ pub struct Half {
 pub struct DeadTime {
     /// Voltage that it takes of a phase where nobody knows the sign of its current, in V.
     pub voltage_v: f32,
+    /// Part of that which is left where the signs of all currents are known.
+    pub left_share: f32,
     /// By how much an edge comes late where nobody makes up for it, in s.
     pub time_s: f32,
 }
 
 impl DeadTime {
-    /// Of so many ticks in carriers of `carrier_ticks`, on a link of `link_v`.
+    /// Of legs of two gates: so many ticks in carriers of `carrier_ticks`, on a link of `link_v`.
     #[inline]
     pub fn of(ticks: u32, carrier_ticks: u32, link_v: f32, clock: &Clock) -> Self {
         let (ticks, carrier_ticks) = (ticks as f32, carrier_ticks as f32);
-        Self { voltage_v: link_v * ticks / carrier_ticks, time_s: ticks / clock.ticks_per_s }
+        let voltage_v = link_v * ticks / carrier_ticks;
+        Self { voltage_v, left_share: 0.2, time_s: ticks / clock.ticks_per_s }
     }
 }
 
@@ -318,7 +319,7 @@ impl MapError {
     fn dead_v(&self, input: &Input) -> f32 {
         let small_a = SMALL * input.tables.ratings.max_current_a;
         let (small, large) = (small_a * small_a, self.block.current.squared());
-        let unsure = (small + SURE * large) / (small + large);
+        let unsure = (small + input.dead.left_share * large) / (small + large);
         input.dead.voltage_v * unsure
     }
 

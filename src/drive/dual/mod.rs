@@ -83,13 +83,11 @@ impl Settings {
             clock,
             carrier_ticks,
             dead_time_ticks: 0,
-            // A dead time that is not told takes voltage along and across either motor's current: a resistance in doubt would have both taken for less flux linkage.
             // What is learnt is learnt in every other period, from both.
             gains: Gains {
                 carrier: 0.6,
                 observer: TURNS as f32 * 0.02,
                 sixth_turn_rad: TURNS as f32 * Gains::DEFAULT.sixth_turn_rad,
-                resistance_doubt: 0.05,
                 ..Gains::DEFAULT
             },
             speed: SpeedDesign {

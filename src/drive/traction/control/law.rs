@@ -117,7 +117,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             let there = RotorSample::new(self.gains.without(self.zeros.without(currents_a)), angle, tables);
             self.controller.learn(&boundary, &there, follows(slot.key.mode), &Law { gains, clock, tables });
             let (unexplained_v, omega) = (self.controller.unexplained_v(), self.controller.omega());
-            self.unexplained.step(unexplained_v, omega, boundary.length_s, tables);
+            self.unexplained.step(unexplained_v, 0.0, omega, boundary.length_s, tables);
         }
     }
 
