@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use tractive_control::control::{
-//!     Committed, Regulated, Gains, ModeLimits, Observer, Region, RotorSample, Target, current_loop, flux_linkage, mtpa,
+//!     Committed, Gains, ModeLimits, Observer, Region, RotorSample, Target, current_loop, flux_linkage, mtpa,
 //! };
 //! use tractive_control::frames::{AlphaBeta, Angle};
 //! # fn main() -> Result<(), tractive_tablegen::InputError> {
@@ -22,17 +22,7 @@
 //! let sample = RotorSample::new(now.unpark(angle.sin_cos()).abc(), angle, &tables);
 //! let volt_seconds = Some(AlphaBeta::default());
 //! let committed = Committed { horizon_s: 0.0, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };
-//! let limits = ModeLimits {
-//!     follows: Regulated::Mean,
-//!     # index_limit: 0.9,
-//!     # steady_limit: 0.9,
-//!     # filled: false,
-//!     # ripple_share: 0.05,
-//!     # ripple_s2: None,
-//!     # settled: true,
-//!     # joins: false,
-//!     // …
-//! };
+//! let limits = ModeLimits::carrier(0.9);
 //! let target = Target {
 //!     current: wanted,
 //!     flux: reference,
@@ -314,7 +304,7 @@ mod tests {
 
     /// A carrier's voltage for a reference, of flux linkage that is seen, both in Wb, on a limit in V.
     fn voltage(flux: Dq, reference: Dq, limit_v: f32) -> Dq {
-        voltage_of(&ModeLimits::CARRIER, flux, reference, limit_v)
+        voltage_of(&ModeLimits::carrier(0.9), flux, reference, limit_v)
     }
 
     fn voltage_of(limits: &ModeLimits, flux: Dq, reference: Dq, limit_v: f32) -> Dq {
@@ -359,7 +349,7 @@ mod tests {
     #[test]
     fn a_pattern_regulates_nothing_where_it_joins() {
         let (flux, reference) = (Dq { d: 0.1, q: -0.4 }, Dq { d: 0.12, q: -0.39 });
-        let pattern = ModeLimits { follows: Regulated::Fundamental, ..ModeLimits::CARRIER };
+        let pattern = ModeLimits { follows: Regulated::Fundamental, ..ModeLimits::carrier(0.9) };
         let off = |joins| {
             voltage_of(&ModeLimits { joins, ..pattern }, flux, reference, LIMIT_V) - reference.j() * OMEGA
         };

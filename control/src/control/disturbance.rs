@@ -161,7 +161,7 @@ mod tests {
                     target: &target,
                     omega: 0.0,
                     committed: &committed,
-                    limits: &ModeLimits::CARRIER,
+                    limits: &ModeLimits::carrier(0.9),
                     drop_v: Dq::default(),
                 },
                 &Gains::DEFAULT,
