@@ -388,9 +388,3 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
 fn nearer_zero(a: f32, b: f32) -> f32 {
     if a.abs() < b.abs() { a } else { b }
 }
-
-impl Default for Controller {
-    fn default() -> Self {
-        Self::new()
-    }
-}

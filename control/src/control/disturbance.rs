@@ -35,12 +35,6 @@ pub struct Input<'a> {
     pub sixth: bool,
 }
 
-impl Default for Observer {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Observer {
     /// No disturbance known yet.
     pub const fn new() -> Self {

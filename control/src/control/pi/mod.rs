@@ -122,12 +122,6 @@ impl PiLaw {
     }
 }
 
-impl Default for PiLaw {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl ControlLaw for PiLaw {
     const FEEDS_POWER_FORWARD: bool = false;
 
