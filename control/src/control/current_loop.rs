@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use tractive_control::control::{
-//!     Committed, Gains, ModeLimits, Observer, Region, RotorSample, Target, current_loop, flux_linkage, mtpa,
+//!     Committed, Gains, ModeLimits, Observer, RotorSample, Target, current_loop, flux_linkage, mtpa,
 //! };
 //! use tractive_control::frames::{AlphaBeta, Angle};
 //! # fn main() -> Result<(), tractive_tablegen::InputError> {
@@ -23,15 +23,7 @@
 //! let volt_seconds = Some(AlphaBeta::default());
 //! let committed = Committed { horizon_s: 0.0, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };
 //! let limits = ModeLimits::carrier(0.9);
-//! let target = Target {
-//!     current: wanted,
-//!     flux: reference,
-//!     voltage_limit_v: 800.0,
-//!     # torque_nm: 700.0,
-//!     # region: Region::Mtpa,
-//!     # modulation_index: 0.1,
-//!     // …
-//! };
+//! let target = Target { current: wanted, flux: reference, voltage_limit_v: 800.0, ..Target::NONE };
 //! let input = current_loop::Input {
 //!     ahead: &current_loop::ahead(&sample, at_rest, &committed, &none, drop_v),
 //!     disturbance: &none,
@@ -296,7 +288,6 @@ impl Voltage {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Region;
     use super::*;
 
     const OMEGA: f32 = 1_000.0;
@@ -311,14 +302,8 @@ mod tests {
         let at_rest = Angle::ZERO.sin_cos();
         let sample = RotorSample { frame: at_rest, current: Dq::default(), flux };
         let committed = Committed { horizon_s: 0.0, volt_seconds: None, ripple_wb: None, interval_s: 50e-6 };
-        let target = Target {
-            torque_nm: 0.0,
-            current: Dq::default(),
-            flux: reference,
-            region: Region::Mtpa,
-            modulation_index: 0.5,
-            voltage_limit_v: limit_v,
-        };
+        let target =
+            Target { flux: reference, modulation_index: 0.5, voltage_limit_v: limit_v, ..Target::NONE };
         let disturbance = Observer::new();
         let input = Input {
             ahead: &ahead(&sample, at_rest, &committed, &disturbance, Dq::default()),

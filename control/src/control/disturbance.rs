@@ -110,7 +110,7 @@ impl Observer {
 mod tests {
     extern crate std;
 
-    use super::super::{Committed, ModeLimits, Region, Target, current_loop};
+    use super::super::{Committed, ModeLimits, Target, current_loop};
     use super::*;
     use std::vec::Vec;
 
@@ -140,14 +140,7 @@ mod tests {
             let none = Some(AlphaBeta::default());
             let committed =
                 Committed { horizon_s: 0.0, volt_seconds: none, ripple_wb: None, interval_s: HALF_S };
-            let target = Target {
-                torque_nm: 0.0,
-                current: Dq::default(),
-                flux: along_d(REFERENCE_WB),
-                region: Region::Mtpa,
-                modulation_index: 0.1,
-                voltage_limit_v: limit_v,
-            };
+            let target = Target { flux: along_d(REFERENCE_WB), voltage_limit_v: limit_v, ..Target::NONE };
             let output = current_loop::step(
                 &current_loop::Input {
                     ahead: &current_loop::ahead(&sample, at_rest, &committed, &observer, Dq::default()),
