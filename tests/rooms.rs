@@ -224,7 +224,7 @@ fn control_and_modulation_know_neither_each_other_nor_the_nine_switch() {
         ("frames", &[]),
         ("time", &["frames"]),
         ("machine", &[]),
-        ("control", &["frames", "time", "machine"]),
+        ("control", &["frames", "named", "time", "machine"]),
         ("identification", &["control", "frames", "named", "time", "machine"]),
         ("modulation", &["frames", "time"]),
         ("nine_switch", &["frames", "named"]),
