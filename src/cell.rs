@@ -155,12 +155,6 @@ impl<T: Words<N>, const N: usize, const SLOTS: usize> Mailbox<T, N, SLOTS> {
     }
 }
 
-impl<T: Words<N>, const N: usize, const SLOTS: usize> Default for Mailbox<T, N, SLOTS> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// Counts a try that a write has overtaken; says whether there is another one. Out of line: so a read is there once, not once a try.
 #[cold]
 #[inline(never)]
@@ -234,12 +228,6 @@ impl<T: Words<N>, const N: usize> Seqlock<T, N> {
                 return None;
             }
         }
-    }
-}
-
-impl<T: Words<N>, const N: usize> Default for Seqlock<T, N> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -345,12 +333,6 @@ impl<const N: usize> History<N> {
     #[inline(always)]
     fn record(&self, place: Place, back: u32) -> Record<'_, N> {
         Record(&self.records[place.0.wrapping_sub(back) as usize % RECORDS])
-    }
-}
-
-impl<const N: usize> Default for History<N> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

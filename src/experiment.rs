@@ -93,12 +93,6 @@ fn stage_of(kept: u32) -> Stage {
     stage.copied().unwrap_or(Stage::Done)
 }
 
-impl<const N: usize> Default for Memory<N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// Calls between two frames of progress.
 const PROGRESS_CALLS: u32 = 32;
 
@@ -138,12 +132,6 @@ impl Teller {
             (self.index, self.part) = (if next < told.observations { next } else { 0 }, 0);
         }
         Some(OBSERVATION.frame(content.encode(), observed))
-    }
-}
-
-impl Default for Teller {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

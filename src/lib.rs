@@ -50,6 +50,8 @@ pub mod thermal;
 #[cfg(feature = "wire")]
 pub mod wire;
 
+#[doc(hidden)]
+pub use tractive_control::named;
 pub use tractive_control::{
     control, frames, identification, machine, modulation, nine_switch, start_up, time,
 };

@@ -143,28 +143,16 @@ impl Request {
     /// From a block; `None` if it is none of ours.
     pub fn from_block(block: &Block) -> Option<Self> {
         let [tag, at, payload @ ..] = *block;
-        let at = Instant(at);
+        let (at, [first, ..]) = (Instant(at), payload);
         Some(match tag {
             1 => Self::Hello,
             2 => Self::ControlSample(at),
-            3 => {
-                let [a, b, c, d, e, f, g, h, i, j, k, l, m, ..] = payload;
-                Self::ControlReport(at, Report::from_words([a, b, c, d, e, f, g, h, i, j, k, l, m]))
-            }
+            3 => Self::ControlReport(at, Report::from_words(*payload.first_chunk()?)),
             4 => Self::PwmSample(at),
-            5 => {
-                let [a, b, c, d, e, ..] = payload;
-                Self::Play(at, half_from_words([a, b, c, d, e]))
-            }
-            6 => {
-                let [safe, ..] = payload;
-                Self::Enter(at, SafeState::from_code(safe))
-            }
+            5 => Self::Play(at, half_from_words(*payload.first_chunk()?)),
+            6 => Self::Enter(at, SafeState::from_code(first)),
             7 => Self::Dead,
-            8 => {
-                let [a, b, c, d, e, f, g, h, i, j, ..] = payload;
-                Self::Recorded(Record::from_words([a, b, c, d, e, f, g, h, i, j]))
-            }
+            8 => Self::Recorded(Record::from_words(*payload.first_chunk()?)),
             9 => Self::End,
             10 => Self::Leave(at),
             11 => Self::Ask(at),
@@ -172,14 +160,8 @@ impl Request {
                 let (status, frame) = told_from_words(payload)?;
                 Self::Tell(at, status, frame)
             }
-            13 => {
-                let [a, b, c, d, e, f, g, h, i, ..] = payload;
-                Self::Observed(at, Observation::from_words([a, b, c, d, e, f, g, h, i])?)
-            }
-            14 => {
-                let [zero, ..] = payload;
-                Self::Align(at, Angle(zero))
-            }
+            13 => Self::Observed(at, Observation::from_words(*payload.first_chunk()?)?),
+            14 => Self::Align(at, Angle(first)),
             _ => return None,
         })
     }
@@ -249,8 +231,8 @@ pub fn told_to_block<T: DemandWords>(from: Instant, status: &Status<T>, frame: O
 
 /// The inverse of [`told_to_words`].
 fn told_from_words<T: DemandWords>(words: [u32; 14]) -> Option<(Status<T>, Option<Frame>)> {
-    let [a, b, c, d, e, f, g, h, i, head, low, high, ..] = words;
-    Some((Status::from_words([a, b, c, d, e, f, g, h, i])?, Option::from_words([head, low, high])))
+    let [status @ .., head, low, high, _, _] = words;
+    Some((Status::from_words(status)?, Option::from_words([head, low, high])))
 }
 
 /// The inverse of [`setup_to_block`].

@@ -163,7 +163,7 @@ fn units_are_those_of_the_code() {
     let (page, declared) = (read("docs/faults.md"), read("src/protection/fault.rs"));
     let mut wrong = Vec::new();
     for (fault, row) in Fault::ALL.into_iter().zip(table(&page)) {
-        let variant = declared.find(&format!("    {fault:?}")).unwrap();
+        let variant = declared.find(&format!("        {fault:?}")).unwrap();
         // Of the lower motor the code says that it is the same.
         let comment = doc_comment(&declared[..variant]).replace("the same of", "in electrical rad, of");
         let differ =

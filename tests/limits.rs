@@ -5,8 +5,8 @@ use core::f32::consts::TAU;
 use tractive::built_in::traction::BUILT_IN;
 use tractive::cell::Words;
 use tractive::control::{
-    AimInput, Committed, ControlLaw, Controller, Demand, Gains, Law, Measurements, ModeLimits, Regulated,
-    RotorSample, VoltageLimit, operating_point,
+    AimInput, Committed, ControlLaw, Controller, Demand, Gains, Law, Measurements, ModeLimits, RotorSample,
+    VoltageLimit, operating_point,
 };
 use tractive::frames::{Abc, AlphaBeta, Angle};
 use tractive::machine::Ratings;
@@ -463,16 +463,7 @@ fn a_trip_comes_back_from_its_words() {
 fn aimed_share(share: f32) -> f32 {
     let (tables, clock) = (&BUILT_IN, Clock::new(25_000_000, 2_500));
     let law = Law { gains: &Gains::DEFAULT, clock: &clock, tables };
-    let limits = ModeLimits {
-        follows: Regulated::Mean,
-        index_limit: 1.0,
-        steady_limit: 1.0,
-        filled: false,
-        ripple_share: 0.05,
-        ripple_s2: None,
-        settled: true,
-        joins: false,
-    };
+    let limits = ModeLimits::carrier(1.0);
     let turns = 4_000.0 / 60.0 * tables.ratings.pole_pairs * 1e-4;
     let limit = VoltageLimit { udc_v: 1_000.0, modulation_index: 1.0, filled: false };
     let omega = turns * 1e4 * std::f32::consts::TAU;
@@ -488,20 +479,7 @@ fn aimed_share(share: f32) -> f32 {
         let sample = RotorSample::new(current.unpark(angle.sin_cos()).abc(), angle, tables);
         controller.observe(&sample, tables);
         if period % 5 == 0 && period > 1_000 {
-            let (window, swing) = (None, None);
-            let (udc_v, change_v, link_scale) = (1_000.0, 0.0, 1.0);
-            let demand = &demand;
-            let aim = AimInput {
-                demand,
-                window,
-                udc_v,
-                change_v,
-                link_scale,
-                swing,
-                iron_share: 0.0,
-                limits: &limits,
-            };
-            controller.aim(&aim, &law);
+            controller.aim(&AimInput::plain(&demand, 1_000.0, &limits), &law);
             controller.regulate(&sample, &committed, &limits, &law);
         }
     }

@@ -73,16 +73,7 @@ struct Walk {
 
 impl Walk {
     fn new(number: u32) -> Self {
-        let limits = ModeLimits {
-            follows: Regulated::Mean,
-            index_limit: 0.9,
-            steady_limit: 0.9 * 0.95,
-            filled: false,
-            ripple_share: 0.05,
-            ripple_s2: None,
-            settled: true,
-            joins: false,
-        };
+        let limits = ModeLimits { steady_limit: 0.9 * 0.95, ..ModeLimits::carrier(0.9) };
         Self {
             random: Random(u64::from(number) + 1),
             rpm: 0.0,
@@ -189,18 +180,8 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
             let passed_s = law.passed_s(&clock);
             let swing =
                 (number & 1 != 0).then(|| damper.step(walk.udc_v, passed_s, omega, walk.limits.follows));
-            let (demand, udc_v) = (walk.demand, walk.udc_v);
-            let input = AimInput {
-                demand: &demand,
-                window: walk.window.as_ref(),
-                udc_v,
-                change_v: 0.0,
-                link_scale: 1.0,
-                swing,
-                iron_share: 0.0,
-                limits: &walk.limits,
-            };
-            law.aim(&input, &law_of);
+            let plain = AimInput::plain(&walk.demand, walk.udc_v, &walk.limits);
+            law.aim(&AimInput { window: walk.window.as_ref(), swing, ..plain }, &law_of);
             let committed = walk.committed();
             let made = law.regulate(&sample, &committed, &walk.limits, &law_of);
             let target = *law.target();

@@ -82,7 +82,7 @@ fn a_downlink_between_threads_has_what_is_ready() {
 
 #[test]
 fn every_value_arrives_in_its_turn() {
-    let (down, up) = (Mailbox::<Message, 9>::default(), Seqlock::<Message, 9>::default());
+    let (down, up) = (Mailbox::<Message, 9>::new(), Seqlock::<Message, 9>::new());
     for n in 1..ROUNDS {
         down.publish(Message::number(n));
         up.publish(Message::number(n));

@@ -35,6 +35,7 @@ pub mod frames;
 pub mod identification;
 pub mod machine;
 pub mod modulation;
+mod named;
 pub mod nine_switch;
 pub mod start_up;
 pub mod time;

@@ -135,19 +135,7 @@ fn least_of_references<L: ControlLaw>(
             continue;
         }
         let demand = Demand { torque_nm: wanted_nm, slew_limited: period < 6_000 };
-        law.aim(
-            &AimInput {
-                demand: &demand,
-                window: None,
-                udc_v,
-                change_v: 0.0,
-                link_scale: 1.0,
-                swing: None,
-                iron_share: 0.0,
-                limits,
-            },
-            &constants,
-        );
+        law.aim(&AimInput::plain(&demand, udc_v, limits), &constants);
         let target = law.target();
         current_a = current_a.min(target.current.d);
         flux_a = flux_a.min(id_a(tables, target.flux));
@@ -157,16 +145,7 @@ fn least_of_references<L: ControlLaw>(
 
 #[test]
 fn references_keep_the_limit_on_their_way_as_well() {
-    let way = |follows, filled, settled| ModeLimits {
-        follows,
-        index_limit: 1.0,
-        steady_limit: 1.0,
-        filled,
-        ripple_share: 0.05,
-        ripple_s2: None,
-        settled,
-        joins: false,
-    };
+    let way = |follows, filled, settled| ModeLimits { follows, filled, settled, ..ModeLimits::carrier(1.0) };
     let ways = [
         way(Regulated::Mean, false, true),
         way(Regulated::Fundamental, false, true),
@@ -194,16 +173,7 @@ fn references_keep_the_limit_on_their_way_as_well() {
 #[test]
 fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
     let limited = tables(true);
-    let limits = ModeLimits {
-        follows: Regulated::Mean,
-        index_limit: 0.9,
-        steady_limit: 0.9,
-        filled: false,
-        ripple_share: 0.05,
-        ripple_s2: None,
-        settled: true,
-        joins: false,
-    };
+    let limits = ModeLimits::carrier(0.9);
     let clock = Clock::new(25_000_000, 2_500);
     let constants = Law { gains: &Gains::DEFAULT, clock: &clock, tables: &limited };
     let mut law = PiLaw::new();
@@ -225,17 +195,7 @@ fn the_papers_law_keeps_it_however_much_voltage_is_missing() {
             continue;
         }
         let demand = Demand { torque_nm: 1_235.0, slew_limited: true };
-        let input = AimInput {
-            demand: &demand,
-            window: None,
-            udc_v: 900.0,
-            change_v: 0.0,
-            link_scale: 1.0,
-            swing: None,
-            iron_share: 0.0,
-            limits: &limits,
-        };
-        law.aim(&input, &constants);
+        law.aim(&AimInput::plain(&demand, 900.0, &limits), &constants);
         law.regulate(&sample, &committed, &limits, &constants);
         least_a = least_a.min(law.target().current.d);
         torque_nm = law.target().torque_nm;

@@ -118,16 +118,7 @@ struct Outcome {
 }
 
 /// The limits that the experiment runs within.
-const LIMITS: ModeLimits = ModeLimits {
-    follows: Regulated::Mean,
-    index_limit: 0.906,
-    steady_limit: 0.906,
-    filled: false,
-    ripple_share: 0.05,
-    ripple_s2: None,
-    settled: true,
-    joins: false,
-};
+const LIMITS: ModeLimits = ModeLimits::carrier(0.906);
 
 fn run(machine: &str, flux_scale: f64, sensors: Sensors) -> Outcome {
     let folder = MachineFolder::read(&tables(machine)).unwrap();
@@ -152,17 +143,8 @@ fn run(machine: &str, flux_scale: f64, sensors: Sensors) -> Outcome {
             &law,
         );
         let demand = Demand { torque_nm: 0.0, slew_limited: false };
-        let input = AimInput {
-            demand: &demand,
-            window: None,
-            udc_v: tables.ratings.dc_link_nominal_v,
-            change_v: 0.0,
-            link_scale: 1.0,
-            swing: None,
-            iron_share: 0.0,
-            limits: &LIMITS,
-        };
-        identification.aim(&input, &law);
+        let udc_v = tables.ratings.dc_link_nominal_v;
+        identification.aim(&AimInput::plain(&demand, udc_v, &LIMITS), &law);
         let committed = Committed {
             horizon_s: half_s as f32,
             volt_seconds: Some(committed_v * half_s as f32),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use tractive_control::control::{
-    AimInput, ControlLaw, Controller, Demand, Gains, Law, ModeLimits, Region, Regulated, RotorSample, Target,
+    AimInput, ControlLaw, Controller, Demand, Gains, Law, ModeLimits, Region, RotorSample, Target,
     flux_linkage, torque_nm,
 };
 use tractive_control::frames::Angle;
@@ -22,16 +22,7 @@ struct Driven {
 fn driven(tables: &Tables, share: f32, (rpm, udc_v): (f32, f32), demand_nm: f32) -> Driven {
     let clock = Clock::new(25_000_000, 2_500);
     let constants = Law { gains: &Gains::DEFAULT, clock: &clock, tables };
-    let limits = ModeLimits {
-        follows: Regulated::Mean,
-        index_limit: 1.0,
-        steady_limit: 1.0,
-        filled: false,
-        ripple_share: 0.05,
-        ripple_s2: None,
-        settled: true,
-        joins: false,
-    };
+    let limits = ModeLimits::carrier(1.0);
     let turns = rpm / 60.0 * tables.ratings.pole_pairs * 1e-4;
     let mut law = Controller::new();
     for period in 0..10_000_u16 {
@@ -41,16 +32,7 @@ fn driven(tables: &Tables, share: f32, (rpm, udc_v): (f32, f32), demand_nm: f32)
         law.observe(&sample, tables);
         if period % 5 == 0 && period > 1_000 {
             let demand = Demand { torque_nm: demand_nm, slew_limited: true };
-            let aim = AimInput {
-                demand: &demand,
-                window: None,
-                udc_v,
-                change_v: 0.0,
-                link_scale: 1.0,
-                swing: None,
-                iron_share: share,
-                limits: &limits,
-            };
+            let aim = AimInput { iron_share: share, ..AimInput::plain(&demand, udc_v, &limits) };
             law.aim(&aim, &constants);
         }
     }

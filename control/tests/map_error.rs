@@ -43,16 +43,7 @@ struct Run {
     link_scale: f32,
 }
 
-const LIMITS: ModeLimits = ModeLimits {
-    follows: Regulated::Mean,
-    index_limit: 1.0,
-    steady_limit: 1.0,
-    filled: false,
-    ripple_share: 0.05,
-    ripple_s2: None,
-    settled: true,
-    joins: false,
-};
+const LIMITS: ModeLimits = ModeLimits::carrier(1.0);
 
 impl Run {
     fn new(off: Off) -> Self {
@@ -97,17 +88,8 @@ impl Run {
                 self.last = Some(there);
                 let boundary = Boundary { volt_seconds: acted, length_s: 0.5e-3 };
                 self.law.learn(&boundary, &sample, Regulated::Mean, &constants);
-                let aim = AimInput {
-                    demand: &demand,
-                    window: None,
-                    udc_v: 1_500.0,
-                    change_v: 0.0,
-                    link_scale: self.link_scale,
-                    swing: None,
-                    iron_share: 0.0,
-                    limits: &LIMITS,
-                };
-                self.law.aim(&aim, &constants);
+                let plain = AimInput::plain(&demand, 1_500.0, &LIMITS);
+                self.law.aim(&AimInput { link_scale: self.link_scale, ..plain }, &constants);
                 self.link_scale = self.law.link_scale();
             } else {
                 if self.warmth != Warmth::NONE {

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 use tractive_control::control::{
-    AimInput, Committed, ControlLaw, Controller, Demand, Gains, Law, ModeLimits, Regulated, RotorSample,
-    Warmth,
+    AimInput, Committed, ControlLaw, Controller, Demand, Gains, Law, ModeLimits, RotorSample, Warmth,
 };
 use tractive_control::frames::{AlphaBeta, Angle, Dq, six_step_v};
 use tractive_control::machine::Tables;
@@ -19,16 +18,7 @@ fn tables() -> Tables {
 fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32) {
     let (tables, clock) = (tables(), Clock::new(25_000_000, 2_500));
     let constants = Law { gains: &Gains::DEFAULT, clock: &clock, tables: &tables };
-    let limits = ModeLimits {
-        follows: Regulated::Mean,
-        index_limit: 1.0,
-        steady_limit: 1.0,
-        filled: false,
-        ripple_share: 0.05,
-        ripple_s2: None,
-        settled: true,
-        joins: false,
-    };
+    let limits = ModeLimits::carrier(1.0);
     let volt_seconds = Some(AlphaBeta::default());
     let committed = Committed { horizon_s: 0.0, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };
     let turns = rpm / 60.0 * tables.ratings.pole_pairs * 1e-4;
@@ -43,19 +33,7 @@ fn driven(warmth: Warmth, rpm: f32, torque_nm: f32, udc_v: f32) -> (Dq, Dq, f32)
         }
         if period % 5 == 0 && period > 1_000 {
             let demand = Demand { torque_nm, slew_limited: true };
-            law.aim(
-                &AimInput {
-                    demand: &demand,
-                    window: None,
-                    udc_v,
-                    change_v: 0.0,
-                    link_scale: 1.0,
-                    swing: None,
-                    iron_share: 0.0,
-                    limits: &limits,
-                },
-                &constants,
-            );
+            law.aim(&AimInput::plain(&demand, udc_v, &limits), &constants);
             steady_v = law.regulate(&sample, &committed, &limits, &constants).steady_v;
         }
     }

@@ -100,6 +100,12 @@ impl Finder {
         self.fixed -= 1;
     }
 
+    fn named_constant(&mut self, attributes: &[syn::Attribute], name: &syn::Ident, value: &syn::Expr) {
+        if !is_off(attributes) {
+            self.within(name.to_string(), |finder| finder.constant(|finder| finder.visit_expr(value)));
+        }
+    }
+
     fn function(&mut self, signature: &syn::Signature, block: &Block) {
         let fixed = std::mem::take(&mut self.fixed);
         let early = std::mem::replace(&mut self.early, signature.constness.is_some());
@@ -226,27 +232,15 @@ impl<'ast> Visit<'ast> for Finder {
     }
 
     fn visit_item_const(&mut self, item: &'ast syn::ItemConst) {
-        if !is_off(&item.attrs) {
-            self.within(item.ident.to_string(), |finder| {
-                finder.constant(|finder| finder.visit_expr(&item.expr))
-            });
-        }
+        self.named_constant(&item.attrs, &item.ident, &item.expr);
     }
 
     fn visit_item_static(&mut self, item: &'ast syn::ItemStatic) {
-        if !is_off(&item.attrs) {
-            self.within(item.ident.to_string(), |finder| {
-                finder.constant(|finder| finder.visit_expr(&item.expr))
-            });
-        }
+        self.named_constant(&item.attrs, &item.ident, &item.expr);
     }
 
     fn visit_impl_item_const(&mut self, item: &'ast syn::ImplItemConst) {
-        if !is_off(&item.attrs) {
-            self.within(item.ident.to_string(), |finder| {
-                finder.constant(|finder| finder.visit_expr(&item.expr))
-            });
-        }
+        self.named_constant(&item.attrs, &item.ident, &item.expr);
     }
 
     fn visit_trait_item_const(&mut self, item: &'ast syn::TraitItemConst) {

@@ -2,23 +2,16 @@
 
 use clap::ValueEnum;
 use serde::Serialize;
+use tractive::named;
 
-/// The control law that the drive runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LawName {
-    /// The project's own
-    Tractive,
-    /// The papers' ordinary one: PI loops on measured currents
-    Pi,
-}
-
-impl LawName {
-    /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tractive => "tractive",
-            Self::Pi => "pi",
-        }
+named! {
+    /// The control law that the drive runs.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum LawName {
+        /// The project's own
+        Tractive => "tractive",
+        /// The papers' ordinary one: PI loops on measured currents
+        Pi => "pi",
     }
 }

@@ -9,24 +9,17 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::str::FromStr;
+use tractive::named;
 
-/// The place where the drive runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum On {
-    /// The image, in QEMU.
-    Qemu,
-    /// The same code, on the host.
-    Host,
-}
-
-impl On {
-    /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Qemu => "qemu",
-            Self::Host => "host",
-        }
+named! {
+    /// The place where the drive runs.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum On {
+        /// The image, in QEMU.
+        Qemu => "qemu",
+        /// The same code, on the host.
+        Host => "host",
     }
 }
 

@@ -102,12 +102,6 @@ impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
     }
 }
 
-impl<T: Words<W>, const W: usize, const N: usize> Default for Ring<T, W, N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;

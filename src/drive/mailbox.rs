@@ -182,19 +182,6 @@ where
     }
 }
 
-#[cfg(not(loom))]
-impl<C, R, const COMMAND: usize, const OBSERVATION: usize> Default for Mailboxes<C, R, COMMAND, OBSERVATION>
-where
-    C: Default,
-    R: Copy,
-    Observation<R>: Words<OBSERVATION>,
-    Timed<C>: Words<COMMAND>,
-{
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// The control interrupt's count of the periods in a slot, the operator's step: a millisecond.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlotTimer {

@@ -303,9 +303,3 @@ impl<D: Demands> Operator<D> {
         (enable, Switches { chopper: line::chopper(input.observed.udc_v, line), ..switches })
     }
 }
-
-impl<D: Demands> Default for Operator<D> {
-    fn default() -> Self {
-        Self::new()
-    }
-}

@@ -96,9 +96,3 @@ impl<D: Demands> Slot<D> {
         self.operator.step(&input, settings)
     }
 }
-
-impl<D: Demands> Default for Slot<D> {
-    fn default() -> Self {
-        Self::new()
-    }
-}

@@ -7,103 +7,105 @@ use crate::protection::Trip;
 use crate::protection::trip_from_words;
 use crate::protection::trip_to_words;
 use crate::thermal::Temperatures;
-
-macro_rules! named {
-    ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal),+ $(,)? }) => {
-        $(#[$meta])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-        #[repr(u8)]
-        #[non_exhaustive]
-        pub enum $name { $($(#[$doc])* $variant),+ }
-
-        impl $name {
-            /// All of them, in the order of their codes.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
-
-            /// The name in traces and documents.
-            pub const fn name(self) -> &'static str {
-                match self { $(Self::$variant => $text),+ }
-            }
-
-            /// Its code, its place in [`Self::ALL`].
-            pub const fn code(self) -> u8 {
-                self as u8
-            }
-
-            /// The one with this code; `None` for an unknown number.
-            pub fn from_code(code: u32) -> Option<Self> {
-                Self::ALL.get(code as usize).copied()
-            }
-        }
-    };
-}
+use tractive_control::named;
 
 named! {
     /// The state of the drive.
-    State {
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+    #[repr(u8)]
+    #[non_exhaustive]
+    pub enum State {
         /// Waiting for the first measurements and for the configuration's check.
-        Init = "init",
+        Init => "init",
         /// Sensors, gate drivers, link and configuration are looked at, gates off, contactors open.
-        SelfTest = "self_test",
+        SelfTest => "self_test",
         /// Healthy, contactors open, gates off. A link that is alive without them may be used at once.
-        Ready = "ready",
+        Ready => "ready",
         /// The link is being charged through the precharge resistor, or the main contactor is closing.
-        Precharge = "precharge",
+        Precharge => "precharge",
         /// The link is alive, the main contactor closed, gates off.
-        Charged = "charged",
+        Charged => "charged",
         /// Gates pulse, no torque is asked for.
-        Enabled = "enabled",
+        Enabled => "enabled",
         /// Gates pulse, torque as demanded.
-        Running = "running",
+        Running => "running",
         /// Enabled, but the gates are off: the machine turns freely and will be caught.
-        Coasting = "coasting",
+        Coasting => "coasting",
         /// Torque is ramped to zero, then the gates go off.
-        Stopping = "stopping",
+        Stopping => "stopping",
         /// Contactors open, then the link's energy goes into the discharge resistor.
-        Discharge = "discharge",
+        Discharge => "discharge",
         /// Gates off or active short circuit, contactors open, until acknowledged.
-        Fault = "fault",
+        Fault => "fault",
+    }
+}
+
+impl State {
+    /// Its code, its place in [`Self::ALL`].
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The one with this code; `None` for an unknown number.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.get(code as usize).copied()
     }
 }
 
 named! {
     /// The reason why a command was not followed.
-    Refusal {
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+    #[repr(u8)]
+    #[non_exhaustive]
+    pub enum Refusal {
         /// The self-test has not been passed.
-        NotReady = "not_ready",
+        NotReady => "not_ready",
         /// The drive is in fault: acknowledge first.
-        FaultNotAcknowledged = "fault_not_acknowledged",
+        FaultNotAcknowledged => "fault_not_acknowledged",
         /// The fault's cause is still there.
-        CauseStillPresent = "cause_still_present",
+        CauseStillPresent => "cause_still_present",
         /// There is no fault to acknowledge.
-        NoFault = "no_fault",
+        NoFault => "no_fault",
         /// The link's voltage is below what operation needs, or it is still being charged.
-        LinkNotCharged = "link_not_charged",
+        LinkNotCharged => "link_not_charged",
         /// The link is charged already, or is being charged.
-        AlreadyCharged = "already_charged",
+        AlreadyCharged => "already_charged",
         /// A torque is demanded at the enabling edge, and it does not say that it may be.
-        TorqueNotZero = "torque_not_zero",
+        TorqueNotZero => "torque_not_zero",
         /// Parameters are being written.
-        ParametersOpen = "parameters_open",
+        ParametersOpen => "parameters_open",
         /// The enable input is low.
-        EnableInputLow = "enable_input_low",
+        EnableInputLow => "enable_input_low",
         /// `off` is asked for.
-        OffRequested = "off_requested",
+        OffRequested => "off_requested",
         /// The rotor's angle or speed is not known yet.
-        PositionUnknown = "position_unknown",
+        PositionUnknown => "position_unknown",
         /// Gates pulse, or the drive is on its way to a stop: stop first.
-        NotStopped = "not_stopped",
+        NotStopped => "not_stopped",
         /// The link is being discharged.
-        Discharging = "discharging",
+        Discharging => "discharging",
         /// The machine turns so fast that its EMF would charge the link again.
-        MachineTurning = "machine_turning",
+        MachineTurning => "machine_turning",
         /// This drive has no contactors on its link.
-        NoContactors = "no_contactors",
+        NoContactors => "no_contactors",
         /// A value of the request is not a finite number; its torque counts as zero, its limits as those before.
-        RequestNotFinite = "request_not_finite",
+        RequestNotFinite => "request_not_finite",
         /// A limit lies outside the machine's ratings; the limits before go on.
-        LimitOutOfRange = "limit_out_of_range",
+        LimitOutOfRange => "limit_out_of_range",
+    }
+}
+
+impl Refusal {
+    /// Its code, its place in [`Self::ALL`].
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The one with this code; `None` for an unknown number.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.get(code as usize).copied()
     }
 }
 

@@ -2,173 +2,96 @@
 
 use super::SafeState;
 use crate::time::Instant;
+use tractive_control::named;
 
-/// The fault that trips the drive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[repr(u8)]
-#[non_exhaustive]
-pub enum Fault {
-    /// A phase current above its trip level, in A.
-    Overcurrent = 1,
-    /// DC link above its trip level, in V.
-    DcOvervoltage,
-    /// DC link below its trip level, in V.
-    DcUndervoltage,
-    /// Rotor faster than its trip level, in mechanical rad/s.
-    Overspeed,
-    /// The three phase currents do not add up to zero, in A.
-    PhaseSum,
-    /// A measurement or a result is NaN or infinite.
-    NotFinite,
-    /// Measurements repeat themselves to the last bit although current flows or the rotor turns, in control periods.
-    Frozen,
-    /// The control interrupt ended after its period, in s.
-    ControlDeadline,
-    /// The newest voltage command is too old, in s.
-    StaleCommand,
-    /// ZS9: the source is shorted or too low, in V.
-    SourceUndervoltage,
-    /// ZS9: a capacitor of the network above its trip level, in V.
-    CapacitorOvervoltage,
-    /// ZS9: a shoot-through duty outside what the network is made for.
-    DutyRange,
-    /// ZS9: the upper motor's angle is far off what its speed tells, or stands still while it should turn, in electrical rad; or
-    /// its sensor says so itself: then the value is 1 and the limit 0.
-    SensorLost1,
-    /// ZS9: the same of the lower motor.
-    SensorLost2,
-    /// Gates did not do what they were told. The value has a bit for each: of the ZS9 in the order of
-    /// [`crate::nine_switch::GATES`], of the PMaSynRM drive from u on for the legs.
-    LegStuck,
-    /// A gate driver is not ready, or its wire is broken: the hardware holds the gates off. The value of a break in hardware, this one's and the
-    /// next two's, is 1; of the ZS9's it says where it was seen.
-    GateDriver,
-    /// A comparator has seen a phase current beyond its threshold.
-    HardwareOvercurrent,
-    /// The chip's own break: crystal stopped, processor locked up, or a memory word with a two-bit error.
-    ClockFailure,
-    /// A carrier half ended before its interrupt did, or control saw none come, in s.
-    PwmDeadline,
-    /// The board did not leave the safe state when it was told to, or for so long after an acknowledge, in s.
-    GatesHeld,
-    /// A current where there should be none, in A: a sensor shows it, or a machine with its gates off generates through the diodes.
-    CurrentOffset,
-    /// The link's voltage cannot be what it is measured as, in V.
-    LinkImplausible,
-    /// The position sensor does not answer, or the rotor's speed does not settle while it should stand still. The value is 0, of 1.
-    PositionSensor,
-    /// The configuration was refused, or nobody has checked it. The value is 2 or 0, of 1.
-    Configuration,
-    /// The link did not reach its voltage in time, in V.
-    PrechargeTimeout,
-    /// A contactor does not do what it is told; the value is 1 for the main contactor, 2 for the precharge relay.
-    Contactor,
-    /// The link did not lose its voltage in time, in V.
-    DischargeTimeout,
-    /// The angle is far off what the speed makes of the one before, in electrical rad.
-    AngleLost,
-    /// Drivers found their devices short-circuited and block them; the value has a bit for each, from bit 0 on uh ul vh vl wh wl.
-    DriverBlocked,
-    /// The board refused to start; the value is the number of its reason.
-    StartRefused,
-    /// The winding's temperature sensor is unplugged, shorted or out of its range; the value is what it shows, in °C.
-    WindingSensor,
-    /// The same of the heat sink's.
-    HeatSinkSensor,
-    /// The winding is hotter than where derating ends, in °C.
-    WindingTemperature,
-    /// The devices' junctions are, in °C.
-    JunctionTemperature,
-    /// The machine's voltage is far from what its currents, its angle and its map make it, in V·s: the position sensor stands still, counts the wrong
-    /// way or is off; or pole pairs, the order of the phases or the machine are others than the drive was told.
-    VoltageUnexplained,
+named! {
+    /// The fault that trips the drive.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+    #[repr(u8)]
+    #[non_exhaustive]
+    pub enum Fault {
+        /// A phase current above its trip level, in A.
+        Overcurrent = 1 => "overcurrent",
+        /// DC link above its trip level, in V.
+        DcOvervoltage => "dc_overvoltage",
+        /// DC link below its trip level, in V.
+        DcUndervoltage => "dc_undervoltage",
+        /// Rotor faster than its trip level, in mechanical rad/s.
+        Overspeed => "overspeed",
+        /// The three phase currents do not add up to zero, in A.
+        PhaseSum => "phase_sum",
+        /// A measurement or a result is NaN or infinite.
+        NotFinite => "not_finite",
+        /// Measurements repeat themselves to the last bit although current flows or the rotor turns, in control periods.
+        Frozen => "frozen",
+        /// The control interrupt ended after its period, in s.
+        ControlDeadline => "control_deadline",
+        /// The newest voltage command is too old, in s.
+        StaleCommand => "stale_command",
+        /// ZS9: the source is shorted or too low, in V.
+        SourceUndervoltage => "source_undervoltage",
+        /// ZS9: a capacitor of the network above its trip level, in V.
+        CapacitorOvervoltage => "capacitor_overvoltage",
+        /// ZS9: a shoot-through duty outside what the network is made for.
+        DutyRange => "duty_range",
+        /// ZS9: the upper motor's angle is far off what its speed tells, or stands still while it should turn, in electrical rad; or
+        /// its sensor says so itself: then the value is 1 and the limit 0.
+        SensorLost1 => "sensor_lost_1",
+        /// ZS9: the same of the lower motor.
+        SensorLost2 => "sensor_lost_2",
+        /// Gates did not do what they were told. The value has a bit for each: of the ZS9 in the order of
+        /// [`crate::nine_switch::GATES`], of the PMaSynRM drive from u on for the legs.
+        LegStuck => "leg_stuck",
+        /// A gate driver is not ready, or its wire is broken: the hardware holds the gates off. The value of a break in hardware, this one's and the
+        /// next two's, is 1; of the ZS9's it says where it was seen.
+        GateDriver => "gate_driver",
+        /// A comparator has seen a phase current beyond its threshold.
+        HardwareOvercurrent => "hardware_overcurrent",
+        /// The chip's own break: crystal stopped, processor locked up, or a memory word with a two-bit error.
+        ClockFailure => "clock_failure",
+        /// A carrier half ended before its interrupt did, or control saw none come, in s.
+        PwmDeadline => "pwm_deadline",
+        /// The board did not leave the safe state when it was told to, or for so long after an acknowledge, in s.
+        GatesHeld => "gates_held",
+        /// A current where there should be none, in A: a sensor shows it, or a machine with its gates off generates through the diodes.
+        CurrentOffset => "current_offset",
+        /// The link's voltage cannot be what it is measured as, in V.
+        LinkImplausible => "link_implausible",
+        /// The position sensor does not answer, or the rotor's speed does not settle while it should stand still. The value is 0, of 1.
+        PositionSensor => "position_sensor",
+        /// The configuration was refused, or nobody has checked it. The value is 2 or 0, of 1.
+        Configuration => "configuration",
+        /// The link did not reach its voltage in time, in V.
+        PrechargeTimeout => "precharge_timeout",
+        /// A contactor does not do what it is told; the value is 1 for the main contactor, 2 for the precharge relay.
+        Contactor => "contactor",
+        /// The link did not lose its voltage in time, in V.
+        DischargeTimeout => "discharge_timeout",
+        /// The angle is far off what the speed makes of the one before, in electrical rad.
+        AngleLost => "angle_lost",
+        /// Drivers found their devices short-circuited and block them; the value has a bit for each, from bit 0 on uh ul vh vl wh wl.
+        DriverBlocked => "driver_blocked",
+        /// The board refused to start; the value is the number of its reason.
+        StartRefused => "start_refused",
+        /// The winding's temperature sensor is unplugged, shorted or out of its range; the value is what it shows, in °C.
+        WindingSensor => "winding_sensor",
+        /// The same of the heat sink's.
+        HeatSinkSensor => "heat_sink_sensor",
+        /// The winding is hotter than where derating ends, in °C.
+        WindingTemperature => "winding_temperature",
+        /// The devices' junctions are, in °C.
+        JunctionTemperature => "junction_temperature",
+        /// The machine's voltage is far from what its currents, its angle and its map make it, in V·s: the position sensor stands still, counts the wrong
+        /// way or is off; or pole pairs, the order of the phases or the machine are others than the drive was told.
+        VoltageUnexplained => "voltage_unexplained",
+    }
 }
 
 impl Fault {
-    /// All of them, in the order of their codes, which begin at 1.
-    pub const ALL: [Self; 35] = [
-        Self::Overcurrent,
-        Self::DcOvervoltage,
-        Self::DcUndervoltage,
-        Self::Overspeed,
-        Self::PhaseSum,
-        Self::NotFinite,
-        Self::Frozen,
-        Self::ControlDeadline,
-        Self::StaleCommand,
-        Self::SourceUndervoltage,
-        Self::CapacitorOvervoltage,
-        Self::DutyRange,
-        Self::SensorLost1,
-        Self::SensorLost2,
-        Self::LegStuck,
-        Self::GateDriver,
-        Self::HardwareOvercurrent,
-        Self::ClockFailure,
-        Self::PwmDeadline,
-        Self::GatesHeld,
-        Self::CurrentOffset,
-        Self::LinkImplausible,
-        Self::PositionSensor,
-        Self::Configuration,
-        Self::PrechargeTimeout,
-        Self::Contactor,
-        Self::DischargeTimeout,
-        Self::AngleLost,
-        Self::DriverBlocked,
-        Self::StartRefused,
-        Self::WindingSensor,
-        Self::HeatSinkSensor,
-        Self::WindingTemperature,
-        Self::JunctionTemperature,
-        Self::VoltageUnexplained,
-    ];
-
     /// The fault with this code; `None` for 0 or an unknown number.
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.get((code as usize).wrapping_sub(1)).copied()
-    }
-
-    /// The name in traces.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Overcurrent => "overcurrent",
-            Self::DcOvervoltage => "dc_overvoltage",
-            Self::DcUndervoltage => "dc_undervoltage",
-            Self::Overspeed => "overspeed",
-            Self::PhaseSum => "phase_sum",
-            Self::NotFinite => "not_finite",
-            Self::Frozen => "frozen",
-            Self::ControlDeadline => "control_deadline",
-            Self::StaleCommand => "stale_command",
-            Self::SourceUndervoltage => "source_undervoltage",
-            Self::CapacitorOvervoltage => "capacitor_overvoltage",
-            Self::DutyRange => "duty_range",
-            Self::SensorLost1 => "sensor_lost_1",
-            Self::SensorLost2 => "sensor_lost_2",
-            Self::LegStuck => "leg_stuck",
-            Self::GateDriver => "gate_driver",
-            Self::HardwareOvercurrent => "hardware_overcurrent",
-            Self::ClockFailure => "clock_failure",
-            Self::PwmDeadline => "pwm_deadline",
-            Self::GatesHeld => "gates_held",
-            Self::CurrentOffset => "current_offset",
-            Self::LinkImplausible => "link_implausible",
-            Self::PositionSensor => "position_sensor",
-            Self::Configuration => "configuration",
-            Self::PrechargeTimeout => "precharge_timeout",
-            Self::Contactor => "contactor",
-            Self::DischargeTimeout => "discharge_timeout",
-            Self::AngleLost => "angle_lost",
-            Self::DriverBlocked => "driver_blocked",
-            Self::StartRefused => "start_refused",
-            Self::WindingSensor => "winding_sensor",
-            Self::HeatSinkSensor => "heat_sink_sensor",
-            Self::WindingTemperature => "winding_temperature",
-            Self::JunctionTemperature => "junction_temperature",
-            Self::VoltageUnexplained => "voltage_unexplained",
-        }
     }
 }
 

@@ -144,12 +144,6 @@ impl FrozenWatch {
     }
 }
 
-impl Default for FrozenWatch {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -79,7 +79,5 @@ pub type TelemetrySource<'a> = session::TelemetrySource<'a, Traction>;
 pub type CanEndpoint = endpoint::CanEndpoint<Traction>;
 /// The ZS9's end.
 pub type Zs9Session = session::Session<Zs9>;
-/// The source of the ZS9's telemetry.
-pub type Zs9TelemetrySource<'a> = session::TelemetrySource<'a, Zs9>;
 /// The ZS9's end beside its operator.
 pub type Zs9CanEndpoint = endpoint::CanEndpoint<Zs9>;

@@ -140,9 +140,3 @@ impl<D: MessageSet> Receiver<D> {
         D::decode(frame.id, content, scales).ok_or(Reject::OutOfRange)
     }
 }
-
-impl<D: MessageSet> Default for Receiver<D> {
-    fn default() -> Self {
-        Self::new()
-    }
-}

@@ -5,38 +5,30 @@ use super::parameters::RPM_PER_RAD_S;
 use super::telemetry::{CURRENT_A, FREQUENCY_HZ, SPEED_RPM};
 use crate::machine::Ratings;
 use core::f32::consts::TAU;
+use tractive_control::named;
 
-/// A physical quantity whose signals' steps follow from the machine, by its exponent's place among the bits of [`Scales`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[repr(u8)]
-pub enum Quantity {
-    /// Torque.
-    Torque = 0,
-    /// Current.
-    Current = 4,
-    /// Voltage.
-    Voltage = 8,
-    /// Speed and frequency.
-    Speed = 12,
-    /// Whatever has the same steps on every machine.
-    Fixed = 16,
+named! {
+    /// A physical quantity whose signals' steps follow from the machine, by its exponent's place among the bits of [`Scales`].
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+    #[repr(u8)]
+    pub enum Quantity {
+        /// Torque.
+        Torque = 0 => "torque",
+        /// Current.
+        Current = 4 => "current",
+        /// Voltage.
+        Voltage = 8 => "voltage",
+        /// Speed and frequency.
+        Speed = 12 => "speed",
+        /// Whatever has the same steps on every machine.
+        Fixed = 16 => "fixed",
+    }
 }
 
 impl Quantity {
     /// Those that follow from the machine.
     pub const SCALED: [Self; 4] = [Self::Torque, Self::Current, Self::Voltage, Self::Speed];
-
-    /// Its name.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Torque => "torque",
-            Self::Current => "current",
-            Self::Voltage => "voltage",
-            Self::Speed => "speed",
-            Self::Fixed => "fixed",
-        }
-    }
 }
 
 /// Bits of an exponent, in two's complement.

@@ -89,9 +89,3 @@ impl<D: MessageSet> Sender<D> {
         Some(message.frame(message.mark(content, scales), self.counters.get_mut(place)?))
     }
 }
-
-impl<D: MessageSet> Default for Sender<D> {
-    fn default() -> Self {
-        Self::new()
-    }
-}

@@ -192,9 +192,3 @@ impl ThermalState {
         first
     }
 }
-
-impl Default for ThermalState {
-    fn default() -> Self {
-        Self::new()
-    }
-}

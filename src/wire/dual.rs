@@ -93,18 +93,13 @@ impl DualRequest {
             }
             4 => Self::PowerSample(at),
             5 => {
-                let [a, b, c, d, e, f, g, h, i, ..] = payload;
-                let gates = [a, b, c, d, e, f, g, h, i]
-                    .map(|word| GateTicks { off_from: word & 0xFFFF, off_to: word >> 16 });
-                Self::Play(at, PlayedPeriod { gates })
+                let ticks = |word: u32| GateTicks { off_from: word & 0xFFFF, off_to: word >> 16 };
+                Self::Play(at, PlayedPeriod { gates: payload.first_chunk()?.map(ticks) })
             }
             6 => Self::GatesOff(at),
             7 => Self::Dead,
-            8 => {
-                let [a, b, c, d, e, f, g, h, i, j, k, l, m, n] = payload;
-                let record = [at.0, a, b, c, d, e, f, g, h, i, j, k, l, m, n];
-                Self::Recorded(DualRecord::from_words(record))
-            }
+            // The instant is its first word.
+            8 => Self::Recorded(DualRecord::from_words(*block.last_chunk()?)),
             9 => Self::End,
             10 => Self::Leave(at),
             11 => Self::Ask(at),

@@ -212,10 +212,7 @@ fn a_link_with_a_voltage_is_not_charged_without_its_contactor() {
 
 #[test]
 fn an_operator_begins_at_its_beginning() {
-    assert_eq!(
-        (Operator::default().state(), Configuration::default()),
-        (State::Init, Configuration::Unchecked)
-    );
+    assert_eq!((Operator::new().state(), Configuration::default()), (State::Init, Configuration::Unchecked));
 }
 
 #[test]

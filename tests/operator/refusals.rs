@@ -278,10 +278,10 @@ fn every_refusal_has_a_name_and_a_code_of_its_own() {
     let names: std::collections::BTreeSet<_> = Refusal::ALL.iter().map(|refusal| refusal.name()).collect();
     assert_eq!(names.len(), Refusal::ALL.len());
     for refusal in Refusal::ALL {
-        assert_eq!(Refusal::from_code(refusal.code().into()), Some(*refusal));
+        assert_eq!(Refusal::from_code(refusal.code().into()), Some(refusal));
     }
     for state in State::ALL {
-        assert_eq!(State::from_code(state.code().into()), Some(*state));
+        assert_eq!(State::from_code(state.code().into()), Some(state));
     }
     assert_eq!(State::from_code(State::ALL.len() as u32), None);
 }

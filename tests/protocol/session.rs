@@ -158,7 +158,7 @@ fn limits_are_the_senders_within_the_parameters() {
 fn parameters_are_written_only_while_the_gates_cannot_pulse() {
     for state in State::ALL {
         let mut bench = Bench::armed();
-        bench.status = status(*state);
+        bench.status = status(state);
         assert_eq!(bench.parameter(3, None), None, "the greeting");
         let before = bench.parameter(3, None).unwrap();
         assert_eq!((before.outcome, before.value), (Outcome::Done, Some(BUILT_IN.ratings.max_torque_nm)));

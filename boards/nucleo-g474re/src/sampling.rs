@@ -68,12 +68,6 @@ impl KeptZeros {
     }
 }
 
-impl Default for KeptZeros {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// A converter with its sequence.
 #[derive(Clone, Copy)]
 pub struct Sampler {

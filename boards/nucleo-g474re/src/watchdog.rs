@@ -67,9 +67,3 @@ impl Pulse {
         both
     }
 }
-
-impl Default for Pulse {
-    fn default() -> Self {
-        Self::new()
-    }
-}

@@ -74,6 +74,14 @@ pub struct AimInput<'a> {
     pub limits: &'a ModeLimits,
 }
 
+impl<'a> AimInput<'a> {
+    /// A demand on a link that stands still, with no window, no damping, and no iron loss to be made up for.
+    pub const fn plain(demand: &'a Demand, udc_v: f32, limits: &'a ModeLimits) -> Self {
+        let (window, swing) = (None, None);
+        Self { demand, window, udc_v, change_v: 0.0, link_scale: 1.0, swing, iron_share: 0.0, limits }
+    }
+}
+
 /// The control law's state between two control periods; of a drive whose samples have the ripple of their currents, unless `RIPPLE` is `false`.
 #[derive(Clone, Copy, Debug)]
 pub struct Controller<const RIPPLE: bool = true> {
@@ -379,10 +387,4 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
 /// Of two torques of the same sign the smaller one.
 fn nearer_zero(a: f32, b: f32) -> f32 {
     if a.abs() < b.abs() { a } else { b }
-}
-
-impl Default for Controller {
-    fn default() -> Self {
-        Self::new()
-    }
 }

@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use tractive_control::control::{
-//!     Committed, Regulated, Gains, ModeLimits, Observer, Region, RotorSample, Target, current_loop, flux_linkage, mtpa,
+//!     Committed, Gains, ModeLimits, Observer, RotorSample, Target, current_loop, flux_linkage, mtpa,
 //! };
 //! use tractive_control::frames::{AlphaBeta, Angle};
 //! # fn main() -> Result<(), tractive_tablegen::InputError> {
@@ -22,26 +22,8 @@
 //! let sample = RotorSample::new(now.unpark(angle.sin_cos()).abc(), angle, &tables);
 //! let volt_seconds = Some(AlphaBeta::default());
 //! let committed = Committed { horizon_s: 0.0, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };
-//! let limits = ModeLimits {
-//!     follows: Regulated::Mean,
-//!     # index_limit: 0.9,
-//!     # steady_limit: 0.9,
-//!     # filled: false,
-//!     # ripple_share: 0.05,
-//!     # ripple_s2: None,
-//!     # settled: true,
-//!     # joins: false,
-//!     // …
-//! };
-//! let target = Target {
-//!     current: wanted,
-//!     flux: reference,
-//!     voltage_limit_v: 800.0,
-//!     # torque_nm: 700.0,
-//!     # region: Region::Mtpa,
-//!     # modulation_index: 0.1,
-//!     // …
-//! };
+//! let limits = ModeLimits::carrier(0.9);
+//! let target = Target { current: wanted, flux: reference, voltage_limit_v: 800.0, ..Target::NONE };
 //! let input = current_loop::Input {
 //!     ahead: &current_loop::ahead(&sample, at_rest, &committed, &none, drop_v),
 //!     disturbance: &none,
@@ -306,7 +288,6 @@ impl Voltage {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Region;
     use super::*;
 
     const OMEGA: f32 = 1_000.0;
@@ -314,21 +295,15 @@ mod tests {
 
     /// A carrier's voltage for a reference, of flux linkage that is seen, both in Wb, on a limit in V.
     fn voltage(flux: Dq, reference: Dq, limit_v: f32) -> Dq {
-        voltage_of(&ModeLimits::CARRIER, flux, reference, limit_v)
+        voltage_of(&ModeLimits::carrier(0.9), flux, reference, limit_v)
     }
 
     fn voltage_of(limits: &ModeLimits, flux: Dq, reference: Dq, limit_v: f32) -> Dq {
         let at_rest = Angle::ZERO.sin_cos();
         let sample = RotorSample { frame: at_rest, current: Dq::default(), flux };
         let committed = Committed { horizon_s: 0.0, volt_seconds: None, ripple_wb: None, interval_s: 50e-6 };
-        let target = Target {
-            torque_nm: 0.0,
-            current: Dq::default(),
-            flux: reference,
-            region: Region::Mtpa,
-            modulation_index: 0.5,
-            voltage_limit_v: limit_v,
-        };
+        let target =
+            Target { flux: reference, modulation_index: 0.5, voltage_limit_v: limit_v, ..Target::NONE };
         let disturbance = Observer::new();
         let input = Input {
             ahead: &ahead(&sample, at_rest, &committed, &disturbance, Dq::default()),
@@ -359,7 +334,7 @@ mod tests {
     #[test]
     fn a_pattern_regulates_nothing_where_it_joins() {
         let (flux, reference) = (Dq { d: 0.1, q: -0.4 }, Dq { d: 0.12, q: -0.39 });
-        let pattern = ModeLimits { follows: Regulated::Fundamental, ..ModeLimits::CARRIER };
+        let pattern = ModeLimits { follows: Regulated::Fundamental, ..ModeLimits::carrier(0.9) };
         let off = |joins| {
             voltage_of(&ModeLimits { joins, ..pattern }, flux, reference, LIMIT_V) - reference.j() * OMEGA
         };

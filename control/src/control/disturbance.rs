@@ -35,12 +35,6 @@ pub struct Input<'a> {
     pub sixth: bool,
 }
 
-impl Default for Observer {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Observer {
     /// No disturbance known yet.
     pub const fn new() -> Self {
@@ -116,7 +110,7 @@ impl Observer {
 mod tests {
     extern crate std;
 
-    use super::super::{Committed, ModeLimits, Region, Target, current_loop};
+    use super::super::{Committed, ModeLimits, Target, current_loop};
     use super::*;
     use std::vec::Vec;
 
@@ -146,14 +140,7 @@ mod tests {
             let none = Some(AlphaBeta::default());
             let committed =
                 Committed { horizon_s: 0.0, volt_seconds: none, ripple_wb: None, interval_s: HALF_S };
-            let target = Target {
-                torque_nm: 0.0,
-                current: Dq::default(),
-                flux: along_d(REFERENCE_WB),
-                region: Region::Mtpa,
-                modulation_index: 0.1,
-                voltage_limit_v: limit_v,
-            };
+            let target = Target { flux: along_d(REFERENCE_WB), voltage_limit_v: limit_v, ..Target::NONE };
             let output = current_loop::step(
                 &current_loop::Input {
                     ahead: &current_loop::ahead(&sample, at_rest, &committed, &observer, Dq::default()),
@@ -161,7 +148,7 @@ mod tests {
                     target: &target,
                     omega: 0.0,
                     committed: &committed,
-                    limits: &ModeLimits::CARRIER,
+                    limits: &ModeLimits::carrier(0.9),
                     drop_v: Dq::default(),
                 },
                 &Gains::DEFAULT,

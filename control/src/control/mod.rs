@@ -104,19 +104,20 @@ pub struct ModeLimits {
     pub joins: bool,
 }
 
-#[cfg(test)]
 impl ModeLimits {
-    /// A carrier's, for tests of the loop.
-    const CARRIER: Self = Self {
-        follows: Regulated::Mean,
-        index_limit: 0.9,
-        steady_limit: 0.9,
-        filled: false,
-        ripple_share: 0.05,
-        ripple_s2: None,
-        settled: true,
-        joins: false,
-    };
+    /// The limits of a triangular carrier with little ripple, whose operating point may use all of its fundamental.
+    pub const fn carrier(index_limit: f32) -> Self {
+        Self {
+            follows: Regulated::Mean,
+            index_limit,
+            steady_limit: index_limit,
+            filled: false,
+            ripple_share: 0.05,
+            ripple_s2: None,
+            settled: true,
+            joins: false,
+        }
+    }
 }
 
 /// The voltages that the modulator has already committed itself to, seen from the sample.

@@ -7,28 +7,20 @@
 use super::{flux_linkage, mtpa};
 use crate::frames::{Dq, root, six_step_v, sqrt};
 use crate::machine::{Tables, Weakening};
+use crate::named;
 
-/// The source of an operating point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum Region {
-    /// Least current for the torque; the voltage suffices.
-    Mtpa,
-    /// On the voltage limit, the torque as demanded.
-    Weakening,
-    /// On the voltage limit, with the most torque that current and voltage allow.
-    Limit,
-}
-
-impl Region {
-    /// The name in files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Mtpa => "mtpa",
-            Self::Weakening => "fw",
-            Self::Limit => "limit",
-        }
+named! {
+    /// The source of an operating point.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+    #[non_exhaustive]
+    pub enum Region {
+        /// Least current for the torque; the voltage suffices.
+        Mtpa => "mtpa",
+        /// On the voltage limit, the torque as demanded.
+        Weakening => "fw",
+        /// On the voltage limit, with the most torque that current and voltage allow.
+        Limit => "limit",
     }
 }
 

@@ -24,12 +24,6 @@ pub struct SpeedTracker {
     lost: bool,
 }
 
-impl Default for SpeedTracker {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl SpeedTracker {
     /// A tracker that has seen no angle.
     pub const fn new() -> Self {

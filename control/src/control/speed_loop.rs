@@ -61,12 +61,6 @@ impl SpeedLoop {
     }
 }
 
-impl Default for SpeedLoop {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -174,28 +174,31 @@ mod tests {
     const LARGEST_NM: f32 = 1_000.0;
     const RIPPLE_SHARE: f32 = 0.05;
 
+    /// A large torque that is just what is asked for, in control periods of 10 kHz.
+    const HELD: Input = Input {
+        demand_nm: 900.0,
+        measured_nm: 900.0,
+        foreseen_nm: 0.0,
+        limited: false,
+        short: false,
+        ripple_share: RIPPLE_SHARE,
+        largest_nm: LARGEST_NM,
+        period_s: 1e-4,
+        #[cfg(feature = "optimal")]
+        by_sixths: None,
+    };
+
     /// Trim after 10 ms of holding and 100 ms of an error of torque that nothing changes.
     fn learned_nm(measured_nm: f32, limited: bool, short: bool) -> f32 {
         learned_beyond_nm(0.0, measured_nm, limited, short)
     }
 
     fn learned_beyond_nm(foreseen_nm: f32, measured_nm: f32, limited: bool, short: bool) -> f32 {
-        let (mut trim, demand_nm) = (TorqueTrim::new(), 900.0);
+        let mut trim = TorqueTrim::new();
         for _ in 0..1_100 {
-            trim.step(&Input {
-                demand_nm,
-                measured_nm,
-                foreseen_nm,
-                limited,
-                short,
-                ripple_share: RIPPLE_SHARE,
-                largest_nm: LARGEST_NM,
-                period_s: 1e-4,
-                #[cfg(feature = "optimal")]
-                by_sixths: None,
-            });
+            trim.step(&Input { measured_nm, foreseen_nm, limited, short, ..HELD });
         }
-        trim.trim_nm(demand_nm, foreseen_nm, RIPPLE_SHARE, LARGEST_NM)
+        trim.trim_nm(HELD.demand_nm, foreseen_nm, RIPPLE_SHARE, LARGEST_NM)
     }
 
     #[test]
@@ -221,18 +224,7 @@ mod tests {
         let mut trim = TorqueTrim::new();
         let mut learn = |ripple_share: f32| {
             for _ in 0..1_100 {
-                trim.step(&Input {
-                    demand_nm: 900.0,
-                    measured_nm: 890.0,
-                    foreseen_nm: 0.0,
-                    limited: false,
-                    short: false,
-                    ripple_share,
-                    largest_nm: LARGEST_NM,
-                    period_s: 1e-4,
-                    #[cfg(feature = "optimal")]
-                    by_sixths: None,
-                });
+                trim.step(&Input { measured_nm: 890.0, ripple_share, ..HELD });
             }
             [0.0, RIPPLE_SHARE].map(|share| trim.trim_nm(900.0, 0.0, share, LARGEST_NM))
         };
@@ -252,18 +244,7 @@ mod tests {
             for period in 0..200_u8 {
                 let demand_nm = slope_nm_s * period_s * f32::from(period);
                 let measured_nm = 0.99 * demand_nm;
-                trim.step(&Input {
-                    demand_nm,
-                    measured_nm,
-                    foreseen_nm: 0.0,
-                    limited: false,
-                    short: false,
-                    ripple_share: RIPPLE_SHARE,
-                    largest_nm,
-                    period_s,
-                    #[cfg(feature = "optimal")]
-                    by_sixths: None,
-                });
+                trim.step(&Input { demand_nm, measured_nm, largest_nm, period_s, ..HELD });
             }
             assert_eq!(
                 trim.trim_nm(largest_nm, 0.0, RIPPLE_SHARE, largest_nm) > 0.0,
@@ -279,18 +260,8 @@ mod tests {
         let mut trim = TorqueTrim::new();
         for period in 0..64_u8 {
             let demand_nm = f32::from(period);
-            trim.step(&Input {
-                demand_nm,
-                measured_nm: 0.0,
-                foreseen_nm: 0.0,
-                limited: false,
-                short: false,
-                ripple_share: RIPPLE_SHARE,
-                largest_nm: 1_024.0,
-                period_s: 1.0 / 1_024.0,
-                #[cfg(feature = "optimal")]
-                by_sixths: None,
-            });
+            let (measured_nm, largest_nm, period_s) = (0.0, 1_024.0, 1.0 / 1_024.0);
+            trim.step(&Input { demand_nm, measured_nm, largest_nm, period_s, ..HELD });
         }
         assert!(trim.curvature > 0.0);
     }
@@ -304,17 +275,8 @@ mod tests {
         let period_s = core::f32::consts::FRAC_PI_3 / omega.abs() / SAMPLES as f32 * 1.000_1;
         let mut step = |sample: u32| {
             let ripple_nm = if sample % SAMPLES < SAMPLES / 2 { 200.0 } else { -200.0 };
-            trim.step(&Input {
-                demand_nm: 900.0,
-                measured_nm: 899.0 + ripple_nm,
-                foreseen_nm: 0.0,
-                limited: false,
-                short: false,
-                ripple_share: RIPPLE_SHARE,
-                largest_nm: LARGEST_NM,
-                period_s,
-                by_sixths: Some(omega),
-            });
+            let measured_nm = 899.0 + ripple_nm;
+            trim.step(&Input { measured_nm, period_s, by_sixths: Some(omega), ..HELD });
             trim.trim_nm(900.0, 0.0, RIPPLE_SHARE, LARGEST_NM)
         };
         let held = (HOLD_S / period_s) as u32 + 2;

@@ -219,12 +219,6 @@ impl ZSource {
     }
 }
 
-impl Default for ZSource {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// The larger of two; NaN in the first stays.
 #[inline]
 fn at_least(x: f32, least: f32) -> f32 {

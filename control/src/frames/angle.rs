@@ -21,8 +21,6 @@ impl Angle {
     pub const DEG_30: Self = Self(357_913_941);
     /// 90°.
     pub const DEG_90: Self = Self(1 << 30);
-    /// 120°, rounded to the nearest unit.
-    pub const DEG_120: Self = Self(1_431_655_765);
 
     /// From a number of turns, any sign, |turns| < 2²⁴; NaN gives zero.
     #[inline]

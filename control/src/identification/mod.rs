@@ -105,12 +105,6 @@ impl Identification {
     }
 }
 
-impl Default for Identification {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl ControlLaw for Identification {
     // Its operating point is the experiment's next step.
     const POINT_SERVES: bool = false;

@@ -1,54 +1,29 @@
 //! The words that an identification tells, one observation a carrier boundary.
 
 use crate::frames::{AlphaBeta, Dq, SinCos};
+use crate::named;
 
-/// The part of the experiment in which a carrier half lies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Stage {
-    /// Longer pulses until a current moves.
-    #[default]
-    Probe,
-    /// Direct currents along d.
-    Staircase,
-    /// Pulses along d.
-    AlongD,
-    /// Pulses along q.
-    AlongQ,
-    /// Pulses along both.
-    AlongBoth,
-    /// No current.
-    Rest,
-    /// A turning rotor: sped up, coasting, braked.
-    Turn,
-    /// The experiment is over; no current.
-    Done,
-}
-
-impl Stage {
-    /// All of them; the place is the code.
-    pub const ALL: [Self; 8] = [
-        Self::Probe,
-        Self::Staircase,
-        Self::AlongD,
-        Self::AlongQ,
-        Self::AlongBoth,
-        Self::Rest,
-        Self::Turn,
-        Self::Done,
-    ];
-
-    /// As telemetry and reports call it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Probe => "probe",
-            Self::Staircase => "staircase",
-            Self::AlongD => "along_d",
-            Self::AlongQ => "along_q",
-            Self::AlongBoth => "along_both",
-            Self::Rest => "rest",
-            Self::Turn => "turn",
-            Self::Done => "done",
-        }
+named! {
+    /// The part of the experiment in which a carrier half lies.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Stage {
+        /// Longer pulses until a current moves.
+        #[default]
+        Probe => "probe",
+        /// Direct currents along d.
+        Staircase => "staircase",
+        /// Pulses along d.
+        AlongD => "along_d",
+        /// Pulses along q.
+        AlongQ => "along_q",
+        /// Pulses along both.
+        AlongBoth => "along_both",
+        /// No current.
+        Rest => "rest",
+        /// A turning rotor: sped up, coasting, braked.
+        Turn => "turn",
+        /// The experiment is over; no current.
+        Done => "done",
     }
 }
 

@@ -11,47 +11,35 @@
 
 use super::shares::Share;
 use super::vectors::Direction;
+use crate::named;
 
-/// The place of the zero vectors and of the shoot-through. Toggles a period in brackets, with shoot-through or without.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[repr(u8)]
-#[non_exhaustive]
-pub enum Scheme {
-    /// S-SVPWM: all three zero vectors (24); the least ripple in the Z-source's inductors.
-    S,
-    /// RS-SVPWM: V13 only (16), the fewest losses.
-    Rs,
-    /// RTHD-SVPWM: V14 and V15 (20 or 24), the least harmonics in the motors' currents.
-    #[default]
-    Rthd,
-    /// ZVO-SVPWM: each motor by its angle (19.7 in the mean).
-    Zvo,
-    /// RTHD with the shoot-through in the centres of V14 and V15: for comparison, four toggles more.
-    RthdCentral,
-    /// RTHD with a boundary that slides, so that both motors have the same zero time.
-    RthdSlide,
+named! {
+    /// The place of the zero vectors and of the shoot-through. Toggles a period in brackets, with shoot-through or without.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+    #[repr(u8)]
+    #[non_exhaustive]
+    pub enum Scheme {
+        /// S-SVPWM: all three zero vectors (24); the least ripple in the Z-source's inductors.
+        S => "s",
+        /// RS-SVPWM: V13 only (16), the fewest losses.
+        Rs => "rs",
+        /// RTHD-SVPWM: V14 and V15 (20 or 24), the least harmonics in the motors' currents.
+        #[default]
+        Rthd => "rthd",
+        /// ZVO-SVPWM: each motor by its angle (19.7 in the mean).
+        Zvo => "zvo",
+        /// RTHD with the shoot-through in the centres of V14 and V15: for comparison, four toggles more.
+        RthdCentral => "rthd-central",
+        /// RTHD with a boundary that slides, so that both motors have the same zero time.
+        RthdSlide => "rthd-slide",
+    }
 }
 
 impl Scheme {
-    /// Every scheme, in the order of its discriminant.
-    pub const ALL: [Self; 6] = [Self::S, Self::Rs, Self::Rthd, Self::Zvo, Self::RthdCentral, Self::RthdSlide];
-
     /// The scheme with this discriminant; the default one for an unknown number.
     pub fn from_code(code: u32) -> Self {
         Self::ALL.get(code as usize).copied().unwrap_or_default()
-    }
-
-    /// The name in traces and on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::S => "s",
-            Self::Rs => "rs",
-            Self::Rthd => "rthd",
-            Self::Zvo => "zvo",
-            Self::RthdCentral => "rthd-central",
-            Self::RthdSlide => "rthd-slide",
-        }
     }
 }
 

@@ -1,32 +1,23 @@
 //! The drive's action when a fault comes, and the time of it.
 
 use serde::{Deserialize, Serialize};
+use tractive::named;
 
-/// The drive's action when the fault comes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Action {
-    /// Torque along the speed.
-    Motoring,
-    /// Torque against the speed.
-    Braking,
-    /// Pulses, and no torque.
-    Coasting,
+named! {
+    /// The drive's action when the fault comes.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Action {
+        /// Torque along the speed.
+        Motoring => "motoring",
+        /// Torque against the speed.
+        Braking => "braking",
+        /// Pulses, and no torque.
+        Coasting => "coasting",
+    }
 }
 
 impl Action {
-    /// All three.
-    pub const ALL: [Self; 3] = [Self::Motoring, Self::Braking, Self::Coasting];
-
-    /// The name in tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Motoring => "motoring",
-            Self::Braking => "braking",
-            Self::Coasting => "coasting",
-        }
-    }
-
     /// Sign of the torque.
     pub const fn sign(self) -> f64 {
         match self {

@@ -77,7 +77,7 @@ fn planned(only: &[String]) -> Result<Vec<&'static Plan>> {
 }
 
 fn lines(plan: &[&Plan]) -> BTreeSet<String> {
-    let lines = plan.iter().flat_map(|row| (row.lines)());
+    let lines = plan.iter().flat_map(|row| row.lines());
     lines.flat_map(|line| LAWS.map(|law| format!("{line} {law}"))).collect()
 }
 

@@ -13,22 +13,20 @@ const BEHIND_CHOKE: &str = "steady --speed 1900 --torque 1200 --line 3,4,30";
 const RESISTIVE: &str = "load-steps --rs-error 50";
 
 /// A row that no comparison of both laws has.
-const DAMPING: Plan = Plan {
-    quantity: "1,200 N·m at 1,900 r/min behind 3 mH, 4 mF and 30 mΩ: swing of the link",
-    lines: || words(&[BEHIND_CHOKE]),
-    read: |law| {
+const DAMPING: Plan = Plan::of(
+    "1,200 N·m at 1,900 r/min behind 3 mH, 4 mF and 30 mΩ: swing of the link",
+    || words(&[BEHIND_CHOKE]),
+    |law| {
         let swing = |figures: &_| verdict(figures, "swing of the link").map(|share| 100.0 * share);
         Ok(cell(law.read(&[BEHIND_CHOKE], swing)?, 2, "%"))
     },
-    paper: "",
-    why: "",
-};
+);
 
 /// Another: half as much resistance again as the tables have.
-const RESISTANCE: Plan = Plan {
-    quantity: "half as much resistance again, load steps at 200 r/min: overshoot, within 2 % after",
-    lines: || words(&[RESISTIVE]),
-    read: |law| {
+const RESISTANCE: Plan = Plan::of(
+    "half as much resistance again, load steps at 200 r/min: overshoot, within 2 % after",
+    || words(&[RESISTIVE]),
+    |law| {
         let of = |what: &str| law.read(&[RESISTIVE], |figures| verdict(figures, what));
         let (over, settled) = (cell(of("overshoot")?, 1, "%"), cell(of("settled")?, 1, "ms"));
         Ok(Cell {
@@ -36,9 +34,7 @@ const RESISTANCE: Plan = Plan {
             values: [over.values, settled.values].concat(),
         })
     },
-    paper: "",
-    why: "",
-};
+);
 
 /// Each part: its name, the words that take it away, and the beginning of the quantity that it counts for.
 const PARTS: [(&str, &str, &str); 13] = [
@@ -92,8 +88,7 @@ pub(super) fn planned() -> Result<Vec<Less>> {
 
 /// The command lines that they take.
 pub(super) fn lines(plan: &[Less]) -> BTreeSet<String> {
-    let lines =
-        plan.iter().flat_map(|(_, less, row)| (row.lines)().into_iter().map(move |line| (line, *less)));
+    let lines = plan.iter().flat_map(|(_, less, row)| row.lines().into_iter().map(move |line| (line, *less)));
     lines.flat_map(|(line, less)| [LAWS[0], less, LAWS[1]].map(|more| format!("{line} {more}"))).collect()
 }
 
@@ -109,5 +104,5 @@ pub(super) fn found(plan: &[Less], driven: &BTreeMap<String, Outcome>, machine: 
 /// A row's cell under a law, or without a part of ours, by the words that the runs had besides.
 fn read(row: &Plan, more: &str, driven: &BTreeMap<String, Outcome>, machine: &Machine) -> String {
     let outcomes = Outcomes { law: 0, more, driven, machine };
-    (row.read)(&outcomes).unwrap_or_else(trips).text
+    row.read(&outcomes).unwrap_or_else(trips).text
 }

@@ -8,20 +8,68 @@ use crate::verdict::worst;
 /// A row to be made.
 pub struct Plan {
     pub quantity: &'static str,
-    /// The runs by their words.
-    pub lines: fn() -> Vec<String>,
-    /// A law's numbers; the fault that tripped it where it has none.
-    pub read: fn(&Outcomes) -> Result<Cell, &'static str>,
+    read: Read,
     /// The paper's word on it.
-    pub paper: &'static str,
+    paper: &'static str,
     /// The reason why ours is not ahead, where it is not.
-    pub why: &'static str,
+    why: &'static str,
 }
 
+/// The way to a row's numbers.
+enum Read {
+    /// The runs by their words, and a law's numbers of them; the fault that tripped it where it has none.
+    Runs(fn() -> Vec<String>, fn(&Outcomes) -> Result<Cell, &'static str>),
+    /// Figures of one run by their names, each with its decimals and its unit.
+    Figures(&'static str, &'static [Figure]),
+}
+
+/// A figure's name, its decimals and its unit.
+pub(super) type Figure = (&'static str, usize, &'static str);
+
 impl Plan {
+    /// A row on which the paper says nothing, and in which ours is ahead, of these runs.
+    pub const fn of(
+        quantity: &'static str,
+        lines: fn() -> Vec<String>,
+        read: fn(&Outcomes) -> Result<Cell, &'static str>,
+    ) -> Self {
+        Self { quantity, read: Read::Runs(lines, read), paper: "", why: "" }
+    }
+
+    /// The same of figures of one run.
+    pub const fn figures(quantity: &'static str, line: &'static str, wanted: &'static [Figure]) -> Self {
+        Self { quantity, read: Read::Figures(line, wanted), paper: "", why: "" }
+    }
+
+    /// The same with the paper's word.
+    pub const fn paper(self, paper: &'static str) -> Self {
+        Self { paper, ..self }
+    }
+
+    /// The same with the reason why ours is not ahead.
+    pub const fn why(self, why: &'static str) -> Self {
+        Self { why, ..self }
+    }
+
+    /// The runs by their words.
+    pub fn lines(&self) -> Vec<String> {
+        match self.read {
+            Read::Runs(lines, _) => lines(),
+            Read::Figures(line, _) => words(&[line]),
+        }
+    }
+
+    /// A law's numbers; the fault that tripped it where it has none.
+    pub fn read(&self, law: &Outcomes) -> Result<Cell, &'static str> {
+        match self.read {
+            Read::Runs(_, read) => read(law),
+            Read::Figures(line, wanted) => figures(law, line, wanted),
+        }
+    }
+
     /// Both laws' results, and who is ahead.
     pub fn judge(&self, outcomes: &[Outcomes; 2]) -> Row {
-        let [own, pi] = outcomes.each_ref().map(|law| (self.read)(law).unwrap_or_else(trips));
+        let [own, pi] = outcomes.each_ref().map(|law| self.read(law).unwrap_or_else(trips));
         let pairs = own.values.iter().zip(&pi.values);
         let ahead =
             own.values.iter().all(|value| value.is_finite()) && pairs.into_iter().all(|(own, pi)| own < pi);
@@ -32,6 +80,18 @@ impl Plan {
 /// So many decimals.
 pub(super) fn decimals(value: f64, count: usize) -> String {
     format!("{value:.count$}")
+}
+
+/// Figures of one run by their names, each with its decimals and its unit.
+pub(super) fn figures(law: &Outcomes, line: &str, wanted: &[Figure]) -> Result<Cell, &'static str> {
+    let found = law.figures(line)?;
+    let values = wanted.iter().map(|(name, _, _)| found.number(name).ok_or("not seen"));
+    let values = values.collect::<Result<Vec<_>, _>>()?;
+    let texts = values.iter().zip(wanted).map(|(value, (_, count, unit))| {
+        let gap = if unit.is_empty() { "" } else { " " };
+        format!("{}{gap}{unit}", decimals(*value, *count))
+    });
+    Ok(Cell { text: texts.collect::<Vec<_>>().join(", "), values })
 }
 
 /// The numbers of one verdict over runs, each a number of its own.
@@ -61,47 +121,41 @@ fn full_steps() -> Vec<String> {
 
 /// All rows.
 pub const ROWS: [Plan; 12] = [
-    Plan {
-        quantity: "torque at the characteristic points (figure 10)",
-        lines: || words(&[CHARACTERISTIC]),
-        read: |law| {
+    Plan::of(
+        "torque at the characteristic points (figure 10)",
+        || words(&[CHARACTERISTIC]),
+        |law| {
             let error = |figures: &Figures| {
                 worst(field(figures, "points", "torque_error_percent").into_iter().map(f64::abs))
             };
             let found = law.read(&[CHARACTERISTIC], error)?;
             Ok(Cell { text: format!("within {} %", decimals(found[0], 2)), values: found })
         },
-        paper: "within 5 %",
-        why: "",
-    },
-    Plan {
-        quantity: "efficiency there at 1,235 N·m and 200 r/min, at 1,174.6 N·m and 2,000 r/min, with 0.1 Ω and the losses of `machine.toml`",
-        lines: || words(&[CHARACTERISTIC]),
-        read: |law| {
+    ).paper("within 5 %"),
+    Plan::of(
+        "efficiency there at 1,235 N·m and 200 r/min, at 1,174.6 N·m and 2,000 r/min, with 0.1 Ω and the losses of `machine.toml`",
+        || words(&[CHARACTERISTIC]),
+        |law| {
             let all = field(law.figures(CHARACTERISTIC)?, "points", "efficiency_percent");
             let (Some(slow), Some(fast)) = (all.first(), all.last()) else { return Err("not seen") };
             let text = format!("{} %, {} %", decimals(*slow, 2), decimals(*fast, 2));
             Ok(Cell { text, values: vec![100.0 - slow, 100.0 - fast] })
         },
-        paper: "at least 95 % at each",
-        why: "",
-    },
-    Plan {
-        quantity: "load steps at 200 r/min (figure 8), torque averaged over a carrier: t90, overshoot",
-        lines: || words(&[LOAD_STEPS]),
-        read: |law| {
+    ).paper("at least 95 % at each"),
+    Plan::of(
+        "load steps at 200 r/min (figure 8), torque averaged over a carrier: t90, overshoot",
+        || words(&[LOAD_STEPS]),
+        |law| {
             let [t90, over] = ["t90 in ms", "overshoot"].map(|what| of_verdict(law, &[LOAD_STEPS], what));
             let values = [t90?, over?].concat();
             let text = format!("{} ms, {} %", decimals(values[0], 2), decimals(values[1], 1));
             Ok(Cell { text, values })
         },
-        paper: "no time; of the current no overshoot",
-        why: "",
-    },
-    Plan {
-        quantity: "full torque in one step at 200 r/min: t90, by where in the carrier it comes",
-        lines: full_steps,
-        read: |law| {
+    ).paper("no time; of the current no overshoot"),
+    Plan::of(
+        "full torque in one step at 200 r/min: t90, by where in the carrier it comes",
+        full_steps,
+        |law| {
             let lines = full_steps();
             let lines: Vec<_> = lines.iter().map(String::as_str).collect();
             let found = law.read(&lines, |figures| field(figures, "steps", "t90_ms").first().copied())?;
@@ -110,56 +164,44 @@ pub const ROWS: [Plan; 12] = [
             let text = format!("{} to {} ms", decimals(least, 2), decimals(most, 2));
             Ok(Cell { text, values: vec![least, most] })
         },
-        paper: "",
-        why: "",
-    },
-    Plan {
-        quantity: "current when the mode changes, over the steady envelope (figure 9): motoring, braking, at half torque",
-        lines: || words(&SWEEPS),
-        read: |law| Ok(cell(of_verdict(law, &SWEEPS, "current over the larger steady envelope")?, 1, "%")),
-        paper: "\"no shock\"",
-        why: "",
-    },
-    Plan {
-        quantity: "torque when the mode changes, beyond its ripple: motoring, braking, at half torque",
-        lines: || words(&SWEEPS),
-        read: |law| Ok(cell(of_verdict(law, &SWEEPS, "torque beyond the steady ripple band")?, 0, "N·m")),
-        paper: "",
-        why: "",
-    },
-    Plan {
-        quantity: "square wave, 246.4 kW from 1,905 to 6,000 r/min: mean torque",
-        lines: || words(&[SQUARE]),
-        read: |law| {
+    ),
+    Plan::of(
+        "current when the mode changes, over the steady envelope (figure 9): motoring, braking, at half torque",
+        || words(&SWEEPS),
+        |law| Ok(cell(of_verdict(law, &SWEEPS, "current over the larger steady envelope")?, 1, "%")),
+    ).paper("\"no shock\""),
+    Plan::of(
+        "torque when the mode changes, beyond its ripple: motoring, braking, at half torque",
+        || words(&SWEEPS),
+        |law| Ok(cell(of_verdict(law, &SWEEPS, "torque beyond the steady ripple band")?, 0, "N·m")),
+    ),
+    Plan::of(
+        "square wave, 246.4 kW from 1,905 to 6,000 r/min: mean torque",
+        || words(&[SQUARE]),
+        |law| {
             let found = of_verdict(law, &[SQUARE], "mean torque error in square wave")?;
             Ok(Cell { text: format!("within {} %", decimals(found[0], 2)), values: found })
         },
-        paper: "",
-        why: "",
-    },
-    Plan {
-        quantity: "MTPA in two passes at 200, 600, 859 and 1,235 N·m: torque, current above the least",
-        lines: Vec::new,
-        read: mtpa,
-        paper: "",
-        why: "",
-    },
-    Plan {
-        quantity: "dead time of 5 µs at 200 r/min and 100 N·m: 5th, 7th harmonic",
-        lines: || words(&[DEAD_TIME]),
-        read: |law| {
+    ),
+    Plan::of(
+        "MTPA in two passes at 200, 600, 859 and 1,235 N·m: torque, current above the least",
+        Vec::new,
+        mtpa,
+    ),
+    Plan::of(
+        "dead time of 5 µs at 200 r/min and 100 N·m: 5th, 7th harmonic",
+        || words(&[DEAD_TIME]),
+        |law| {
             let of = |what: &str| of_verdict(law, &[DEAD_TIME], what);
             let harmonics = ["harmonic 5 in %", "harmonic 7 in %"].map(of);
             let [fifth, seventh] = harmonics;
             Ok(cell([fifth?, seventh?].concat(), 2, "%"))
         },
-        paper: "",
-        why: "",
-    },
-    Plan {
-        quantity: "coasting caught at 2,000, 3,000 and 4,500 r/min, the last in square wave: current, and by how much torque is off a quarter of a second later",
-        lines: || words(&[RESTART]),
-        read: |law| {
+    ),
+    Plan::of(
+        "coasting caught at 2,000, 3,000 and 4,500 r/min, the last in square wave: current, and by how much torque is off a quarter of a second later",
+        || words(&[RESTART]),
+        |law| {
             let of = |name: &str| {
                 let all = field(law.figures(RESTART)?, "catches", name);
                 all.get(5..8).map(<[f64]>::to_vec).ok_or("not seen")
@@ -168,23 +210,19 @@ pub const ROWS: [Plan; 12] = [
             let Cell { text, values } = cell(of("catching_current_a")?, 0, "A");
             Ok(Cell { text: format!("{text}; {} N·m", decimals(off_nm, 1)), values })
         },
-        paper: "",
-        why: "at 4,500 r/min the PIs take less current, and are late with the torque",
-    },
-    Plan {
-        quantity: "link 200 V up and down at full torque, trip level 303 A: current",
-        lines: || words(&[LINK]),
-        read: |law| {
+    ).why("at 4,500 r/min the PIs take less current, and are late with the torque"),
+    Plan::of(
+        "link 200 V up and down at full torque, trip level 303 A: current",
+        || words(&[LINK]),
+        |law| {
             let peak = |figures: &Figures| figures.get("peak_current_a")?.as_f64();
             Ok(cell(law.read(&[LINK], peak)?, 0, "A"))
         },
-        paper: "",
-        why: "",
-    },
-    Plan {
-        quantity: "flux map wrong by 10 %, −10 %: noticed as; current at most",
-        lines: || words(&MAP),
-        read: |law| {
+    ),
+    Plan::of(
+        "flux map wrong by 10 %, −10 %: noticed as; current at most",
+        || words(&MAP),
+        |law| {
             let told = |figures: &Figures| figures.get("map_error_estimate_percent")?.as_f64();
             let peak = |figures: &Figures| figures.get("peak_current_a")?.as_f64();
             let (told, peak) = (law.read(&MAP, told)?, law.read(&MAP, peak)?);
@@ -196,9 +234,7 @@ pub const ROWS: [Plan; 12] = [
             let text = format!("{noticed}; {} A, {} A", decimals(peak[0], 0), decimals(peak[1], 0));
             Ok(Cell { text, values: peak })
         },
-        paper: "",
-        why: "",
-    },
+    ),
 ];
 
 /// Of the methods the one that the law runs; the ordinary one also started from no current.

@@ -1,7 +1,7 @@
 //! The rows of the ZS9.
 
-use super::outcome::{Cell, Outcomes};
-use super::rows::{Plan, decimals, words};
+use super::outcome::Cell;
+use super::rows::{Figure, Plan, figures, words};
 
 const LOAD_STEP: &str = "zs9-load-step";
 const FAST: &str = "zs9-load-step --carrier-hz 20000 --uin 800";
@@ -9,18 +9,7 @@ const REVERSE: &str = "zs9-reverse";
 const CYCLE: &str = "zs9-cycle";
 const TIMING: &str = "zs9-timing";
 const SCHEMES: [&str; 4] = ["s", "rs", "rthd", "zvo"];
-
-/// Figures of one run by their names, each with its decimals and its unit.
-fn figures(law: &Outcomes, line: &str, wanted: &[(&str, usize, &str)]) -> Result<Cell, &'static str> {
-    let found = law.figures(line)?;
-    let values = wanted.iter().map(|(name, _, _)| found.number(name).ok_or("not seen"));
-    let values = values.collect::<Result<Vec<_>, _>>()?;
-    let texts = values.iter().zip(wanted).map(|(value, (_, count, unit))| {
-        let gap = if unit.is_empty() { "" } else { " " };
-        format!("{}{gap}{unit}", decimals(*value, *count))
-    });
-    Ok(Cell { text: texts.collect::<Vec<_>>().join(", "), values })
-}
+const LINK: Figure = ("link_deviation_percent", 2, "%");
 
 fn steady() -> Vec<String> {
     SCHEMES.iter().map(|scheme| format!("zs9-steady --scheme {scheme}")).collect()
@@ -28,100 +17,59 @@ fn steady() -> Vec<String> {
 
 /// All rows.
 pub const ROWS: [Plan; 9] = [
-    Plan {
-        quantity: "ZS9, motor 2's load 60 → 100 N·m (figures 14 to 19): motor 1's torque moves by, its speed by",
-        lines: || words(&[LOAD_STEP]),
-        read: |law| {
-            let moved =
-                [("motor1_torque_deviation_nm", 4, "N·m"), ("motor1_speed_deviation_rpm", 5, "r/min")];
-            figures(law, LOAD_STEP, &moved)
-        },
-        paper: "undisturbed",
-        why: "",
-    },
-    Plan {
-        quantity: "ZS9, the same step: motor 2's speed falls by; its torque, 120 N·m allowed, reaches; its speed within 0.2 % again after",
-        lines: || words(&[LOAD_STEP]),
-        read: |law| {
-            let wanted = [
-                ("motor2_speed_deviation_rpm", 1, "r/min"),
-                ("motor2_peak_torque_nm", 1, "N·m"),
-                ("motor2_back_within_0p2_percent_ms", 1, "ms"),
-            ];
-            figures(law, LOAD_STEP, &wanted)
-        },
-        paper: "",
-        why: "the torque that the PIs make beyond what is allowed brings the speed back sooner",
-    },
-    Plan {
-        quantity: "ZS9, the same step: link voltage within, at 10 kHz and 667 V; at 20 kHz and 800 V",
-        lines: || words(&[LOAD_STEP, FAST]),
-        read: |law| {
-            let of = |line| figures(law, line, &[("link_deviation_percent", 2, "%")]);
-            let (slow, fast) = (of(LOAD_STEP)?, of(FAST)?);
+    Plan::figures(
+        "ZS9, motor 2's load 60 → 100 N·m (figures 14 to 19): motor 1's torque moves by, its speed by",
+        LOAD_STEP,
+        &[("motor1_torque_deviation_nm", 4, "N·m"), ("motor1_speed_deviation_rpm", 5, "r/min")],
+    )
+    .paper("undisturbed"),
+    Plan::figures(
+        "ZS9, the same step: motor 2's speed falls by; its torque, 120 N·m allowed, reaches; its speed within 0.2 % again after",
+        LOAD_STEP,
+        &[
+            ("motor2_speed_deviation_rpm", 1, "r/min"),
+            ("motor2_peak_torque_nm", 1, "N·m"),
+            ("motor2_back_within_0p2_percent_ms", 1, "ms"),
+        ],
+    )
+    .why("the torque that the PIs make beyond what is allowed brings the speed back sooner"),
+    Plan::of(
+        "ZS9, the same step: link voltage within, at 10 kHz and 667 V; at 20 kHz and 800 V",
+        || words(&[LOAD_STEP, FAST]),
+        |law| {
+            let (slow, fast) = (figures(law, LOAD_STEP, &[LINK])?, figures(law, FAST, &[LINK])?);
             let text = format!("{}, {}", slow.text, fast.text);
             Ok(Cell { text, values: [slow.values, fast.values].concat() })
         },
-        paper: "steady",
-        why: "",
-    },
-    Plan {
-        quantity: "ZS9, motor 2 reverses (figures 20 to 23): speed off, rms, of motor 1, of motor 2",
-        lines: || words(&[REVERSE]),
-        read: |law| {
-            let off =
-                [("motor1_speed_error_rms_rpm", 6, "r/min"), ("motor2_speed_error_rms_rpm", 4, "r/min")];
-            figures(law, REVERSE, &off)
-        },
-        paper: "",
-        why: "the speed loop is the same, and the torque follows its ramp either way",
-    },
-    Plan {
-        quantity: "ZS9, the same reversal: link voltage within",
-        lines: || words(&[REVERSE]),
-        read: |law| figures(law, REVERSE, &[("link_deviation_percent", 2, "%")]),
-        paper: "",
-        why: "",
-    },
-    Plan {
-        quantity: "ZS9, cycle (figures 24 to 36): link voltage within, capacitors above their reference, kinetic energy not returned",
-        lines: || words(&[CYCLE]),
-        read: |law| {
-            let wanted = [
-                ("link_deviation_percent", 2, "%"),
-                ("capacitor_overshoot_percent", 2, "%"),
-                ("not_returned_percent", 2, "%"),
-            ];
-            figures(law, CYCLE, &wanted)
-        },
-        paper: "",
-        why: "",
-    },
-    Plan {
-        quantity: "ZS9, cruise at 1,300 r/min in weakening, 60 N·m: torque off, current",
-        lines: || words(&[CYCLE]),
-        read: |law| {
-            let wanted = [("cruise_torque_error_percent", 3, "%"), ("cruise_current_a", 2, "A")];
-            figures(law, CYCLE, &wanted)
-        },
-        paper: "",
-        why: "",
-    },
-    Plan {
-        quantity: "ZS9, full torque at 1,450 r/min in weakening, 5 ms after a ramp there, then reversed (zs9-timing): torque off, motoring, braking",
-        lines: || words(&[TIMING]),
-        read: |law| {
-            let wanted =
-                [("motoring_torque_error_percent", 2, "%"), ("braking_torque_error_percent", 2, "%")];
-            figures(law, TIMING, &wanted)
-        },
-        paper: "",
-        why: "motoring, ours still settles after the ramp, with more torque than its demand; the PIs are off as the torque reverses",
-    },
-    Plan {
-        quantity: "ZS9, THD of the currents at 60 N·m and 1,000, 700 r/min, upper, lower motor: S, RS, RTHD, ZVO",
-        lines: steady,
-        read: |law| {
+    )
+    .paper("steady"),
+    Plan::figures(
+        "ZS9, motor 2 reverses (figures 20 to 23): speed off, rms, of motor 1, of motor 2",
+        REVERSE,
+        &[("motor1_speed_error_rms_rpm", 6, "r/min"), ("motor2_speed_error_rms_rpm", 4, "r/min")],
+    )
+    .why("the speed loop is the same, and the torque follows its ramp either way"),
+    Plan::figures("ZS9, the same reversal: link voltage within", REVERSE, &[LINK]),
+    Plan::figures(
+        "ZS9, cycle (figures 24 to 36): link voltage within, capacitors above their reference, kinetic energy not returned",
+        CYCLE,
+        &[LINK, ("capacitor_overshoot_percent", 2, "%"), ("not_returned_percent", 2, "%")],
+    ),
+    Plan::figures(
+        "ZS9, cruise at 1,300 r/min in weakening, 60 N·m: torque off, current",
+        CYCLE,
+        &[("cruise_torque_error_percent", 3, "%"), ("cruise_current_a", 2, "A")],
+    ),
+    Plan::figures(
+        "ZS9, full torque at 1,450 r/min in weakening, 5 ms after a ramp there, then reversed (zs9-timing): torque off, motoring, braking",
+        TIMING,
+        &[("motoring_torque_error_percent", 2, "%"), ("braking_torque_error_percent", 2, "%")],
+    )
+    .why("motoring, ours still settles after the ramp, with more torque than its demand; the PIs are off as the torque reverses"),
+    Plan::of(
+        "ZS9, THD of the currents at 60 N·m and 1,000, 700 r/min, upper, lower motor: S, RS, RTHD, ZVO",
+        steady,
+        |law| {
             let lines = steady();
             let cells = lines
                 .iter()
@@ -131,7 +79,5 @@ pub const ROWS: [Plan; 9] = [
             let values = cells.iter().flat_map(|cell| cell.values.clone()).collect();
             Ok(Cell { text: texts.join("; "), values })
         },
-        paper: "",
-        why: "at 1,000 r/min the PIs already weaken the upper motor: less voltage makes less ripple, and takes more current",
-    },
+    ).why("at 1,000 r/min the PIs already weaken the upper motor: less voltage makes less ripple, and takes more current"),
 ];

@@ -10,7 +10,7 @@ mod merge;
 pub use file::{ShardFile, name};
 pub use merge::{Merged, merge};
 
-use crate::files::{self, make_folder};
+use crate::files::make_folder;
 use crate::run::bar;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
@@ -155,13 +155,6 @@ pub fn csv_row(row: &impl Serialize) -> Result<String> {
     writer.serialize(row)?;
     let bytes = writer.into_inner().map_err(csv::IntoInnerError::into_error)?;
     Ok(String::from_utf8(bytes)?.trim_end_matches('\n').to_owned())
-}
-
-/// The head of a row's CSV.
-pub fn csv_head(row: &impl Serialize) -> Result<String> {
-    let bytes = files::bytes_of_rows([row])?;
-    let text = String::from_utf8(bytes)?;
-    Ok(text.lines().next().unwrap_or_default().to_owned())
 }
 
 #[cfg(test)]

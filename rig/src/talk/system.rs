@@ -1,13 +1,17 @@
 //! The system that is talked to, and the columns of its telemetry.
 
-/// The system that is talked to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum System {
-    /// The PMaSynRM drive.
-    #[default]
-    Pmasynrm,
-    /// Two motors on a Z-source nine-switch inverter.
-    Zs9,
+use tractive::named;
+
+named! {
+    /// The system that is talked to.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+    pub enum System {
+        /// The PMaSynRM drive.
+        #[default]
+        Pmasynrm => "pmasynrm",
+        /// Two motors on a Z-source nine-switch inverter.
+        Zs9 => "zs9",
+    }
 }
 
 impl System {
@@ -24,14 +28,6 @@ impl System {
     /// The place of a column.
     pub fn column(self, name: &str) -> Option<usize> {
         self.columns().iter().position(|column| *column == name)
-    }
-
-    /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Pmasynrm => "pmasynrm",
-            Self::Zs9 => "zs9",
-        }
     }
 
     /// The machine's and its load's inertia unless told otherwise, in kg·m².

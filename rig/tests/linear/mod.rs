@@ -18,36 +18,25 @@ pub struct Linear {
     pub switching_hz: f64,
 }
 
+const INTERIOR: Linear = Linear {
+    name: "interior magnets",
+    pole_pairs: 4,
+    resistance_ohm: 0.12,
+    ld_h: 2.5e-3,
+    lq_h: 5e-3,
+    magnet_wb: 0.33,
+    current_a: 85.0,
+    torque_nm: 120.0,
+    power_w: 14e3,
+    speed_rpm: 2000.0,
+    link_v: 667.0,
+    switching_hz: 4e3,
+};
+
 /// Magnets inside, magnets on the surface, none, and a small one with few of them.
 pub const MACHINES: [Linear; 4] = [
-    Linear {
-        name: "interior magnets",
-        pole_pairs: 4,
-        resistance_ohm: 0.12,
-        ld_h: 2.5e-3,
-        lq_h: 5e-3,
-        magnet_wb: 0.33,
-        current_a: 85.0,
-        torque_nm: 120.0,
-        power_w: 14e3,
-        speed_rpm: 2000.0,
-        link_v: 667.0,
-        switching_hz: 4e3,
-    },
-    Linear {
-        name: "surface magnets, no saliency",
-        pole_pairs: 4,
-        resistance_ohm: 0.12,
-        ld_h: 3e-3,
-        lq_h: 3e-3,
-        magnet_wb: 0.33,
-        current_a: 85.0,
-        torque_nm: 120.0,
-        power_w: 14e3,
-        speed_rpm: 2000.0,
-        link_v: 667.0,
-        switching_hz: 4e3,
-    },
+    INTERIOR,
+    Linear { name: "surface magnets, no saliency", ld_h: 3e-3, lq_h: 3e-3, ..INTERIOR },
     Linear {
         name: "reluctance alone, no magnets",
         pole_pairs: 2,

@@ -3,7 +3,7 @@
 use super::{MotorCommand, MotorShare, Settings, TURNS};
 use crate::control::{
     AimInput, Boundary, Committed, ControlLaw, DeadTime, Demand, Law, Measurements, ModeLimits, Region,
-    Regulated, RotorSample, SpeedInput, SpeedLoop,
+    RotorSample, SpeedInput, SpeedLoop,
 };
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
@@ -181,34 +181,16 @@ impl<L: ControlLaw> Axis<L> {
             ripple_wb: None,
             interval_s: period_s,
         };
-        let limits = ModeLimits {
-            follows: Regulated::Mean,
-            index_limit: LOOP_SHARE,
-            steady_limit: STEADY_SHARE,
-            filled: false,
-            // Linear motors: torque does not depend on the ripple.
-            ripple_share: 1.0,
-            ripple_s2: None,
-            settled: true,
-            joins: false,
-        };
+        // Linear motors: torque does not depend on the ripple.
+        let limits =
+            ModeLimits { steady_limit: STEADY_SHARE, ripple_share: 1.0, ..ModeLimits::carrier(LOOP_SHARE) };
         let law = Law { gains: &settings.gains, clock: &settings.clock, tables };
         let sample = RotorSample::new(input.measured.currents_a, input.measured.angle, tables);
         self.controller.observe(&sample, tables);
         if input.aims || before.is_none() {
             self.controller.pass(&sample);
             let demand = self.demand(input, omega, settings, tables);
-            let aim = AimInput {
-                demand: &demand,
-                window: None,
-                udc_v: input.measured.udc_v,
-                change_v: 0.0,
-                link_scale: 1.0,
-                swing: None,
-                iron_share: 0.0,
-                limits: &limits,
-            };
-            self.controller.aim(&aim, &law);
+            self.controller.aim(&AimInput::plain(&demand, input.measured.udc_v, &limits), &law);
             self.ended = ended;
         } else {
             // Since it learnt last: the noise of the sample between drops out.

@@ -175,10 +175,3 @@ impl<'a> Shared<'a> {
         Self { recorder: Some(recorder), ..Self::new() }
     }
 }
-
-#[cfg(not(loom))]
-impl Default for Shared<'_> {
-    fn default() -> Self {
-        Self::new()
-    }
-}

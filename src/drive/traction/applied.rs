@@ -70,16 +70,7 @@ pub(super) const fn follows(mode: Mode) -> Regulated {
 }
 
 /// Before the first operating point.
-pub(super) const NO_LIMITS: ModeLimits = ModeLimits {
-    follows: Regulated::Mean,
-    index_limit: 0.0,
-    steady_limit: 0.0,
-    filled: false,
-    ripple_share: 1.0,
-    ripple_s2: None,
-    settled: true,
-    joins: false,
-};
+pub(super) const NO_LIMITS: ModeLimits = ModeLimits { ripple_share: 1.0, ..ModeLimits::carrier(0.0) };
 
 /// The limits that a decided mode sets to control at a speed, for the last operating point's modulation index, so long after it, in s.
 pub(super) fn limits(

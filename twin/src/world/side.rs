@@ -193,9 +193,9 @@ fn status(heard: &Listener) -> Option<Status> {
     let refusal = heard.value("refusal");
     let on = |column: &str| heard.value(column) == "1";
     Some(Status {
-        state: *State::ALL.iter().find(|known| known.name() == state)?,
+        state: State::ALL.into_iter().find(|known| known.name() == state)?,
         trip: trip(heard),
-        refusal: tractive::operator::Refusal::ALL.iter().find(|known| known.name() == refusal).copied(),
+        refusal: tractive::operator::Refusal::ALL.into_iter().find(|known| known.name() == refusal),
         refusals: number("refusals") as u32,
         torque_nm: number("torque_nm"),
         switches: Switches {

@@ -4,7 +4,7 @@ use super::log::{ARGUMENTS, Log};
 use super::meter::{Call, Meter, Path as Executed};
 use super::tally::Tally;
 use crate::elf::Image;
-use crate::process;
+use crate::{image, process};
 use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
@@ -65,6 +65,13 @@ pub struct Served {
 pub const DIRECTIONS: [&str; 2] = ["motoring", "braking"];
 
 impl Bench {
+    /// Of an image and the words of the rig's command; what each interrupt executed is not wanted.
+    pub fn of(rig: &Path, qemu: &Path, command: &[&str], path: PathBuf) -> Result<Self> {
+        let (rig, qemu, image) = (rig.to_owned(), qemu.to_owned(), image::read(&path)?);
+        let command = command.iter().map(|word| (*word).to_owned()).collect();
+        Ok(Self { rig, qemu, command, path, image, keeps_paths: false })
+    }
+
     /// Runs the scenario with these options.
     pub fn drive(&self, options: &[&str]) -> Result<Drive> {
         let folder = tempfile::tempdir().context("no temporary folder")?;

@@ -8,7 +8,7 @@ use super::statistics::{INTERRUPTS, Statistics};
 use super::tally::Tally;
 use crate::elf::Image;
 use crate::setup::Toolchain;
-use crate::{build, image, process};
+use crate::{build, process};
 use anyhow::{Context, Result, bail};
 use indicatif::ParallelProgressIterator;
 use rayon::prelude::*;
@@ -77,15 +77,7 @@ impl System {
     /// Builds the image and drives it.
     pub fn measure(self, toolchain: &Toolchain, rig: &Path, qemu: &Path) -> Result<Measured> {
         let path = build::image(toolchain, self.build, None)?;
-        let image = image::read(&path)?;
-        let bench = Bench {
-            rig: rig.to_owned(),
-            qemu: qemu.to_owned(),
-            command: vec!["run".to_owned(), self.scenario.to_owned()],
-            image: image.clone(),
-            path: path.clone(),
-            keeps_paths: false,
-        };
+        let bench = Bench::of(rig, qemu, &["run", self.scenario], path)?;
         let mut sum = Sum::default();
         match self.build {
             build::System::Traction => traction(&bench, &mut sum)?,
@@ -103,20 +95,13 @@ impl System {
                 drives.iter().take(DUAL_DRIVES.len()).for_each(|drive| sum.profile(drive));
             }
         }
-        Measured::new(self, path, image, sum)
+        Measured::new(self, bench.path, bench.image, sum)
     }
 
     /// The cost of the papers' ordinary law: motoring and braking through every mode, without a provoked fault.
     pub fn under_pi(self, toolchain: &Toolchain, rig: &Path, qemu: &Path) -> Result<LawCost> {
         let path = build::pi_image(toolchain, self.build, None)?;
-        let bench = Bench {
-            rig: rig.to_owned(),
-            qemu: qemu.to_owned(),
-            command: ["run", self.scenario, "--law", "pi"].map(str::to_owned).to_vec(),
-            image: image::read(&path)?,
-            path,
-            keeps_paths: false,
-        };
+        let bench = Bench::of(rig, qemu, &["run", self.scenario, "--law", "pi"], path)?;
         let drives = match self.build {
             build::System::Traction => &DRIVES[..],
             build::System::Zs9 => &DUAL_DRIVES[..HEALTHY_DUAL_DRIVES],
@@ -133,14 +118,7 @@ impl System {
 /// The cost of an identification: the whole experiment, with dead time.
 pub fn identification(toolchain: &Toolchain, rig: &Path, qemu: &Path) -> Result<Statistics> {
     let path = build::identify_image(toolchain, None)?;
-    let bench = Bench {
-        rig: rig.to_owned(),
-        qemu: qemu.to_owned(),
-        command: vec!["identify".to_owned()],
-        image: image::read(&path)?,
-        path,
-        keeps_paths: false,
-    };
+    let bench = Bench::of(rig, qemu, &["identify"], path)?;
     let mut statistics = Statistics::default();
     for drive in drive_all("identify", &[(&bench, "--inertia=3 --dead-time-us=5".to_owned())])? {
         statistics.add(&drive)?;

@@ -92,12 +92,6 @@ impl PositionState {
     }
 }
 
-impl Default for PositionState {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// An angle as the drive is told of it: none where the sensor has lost its rotor.
 #[inline]
 pub(super) fn reported(angle: Option<Angle>, lost: bool) -> Option<Angle> {

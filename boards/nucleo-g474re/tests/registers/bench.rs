@@ -15,6 +15,55 @@ fn block() -> *mut () {
     Box::leak(vec![0_u32; 0x100].into_boxed_slice()).as_mut_ptr().cast()
 }
 
+/// Sets a port's inputs, which only the hardware writes.
+pub fn write_input(port: pac::gpio::Gpio, levels: u32) {
+    // SAFETY: IDR is word 4 of the port's block of memory.
+    unsafe { port.as_ptr().cast::<u32>().add(4).write_volatile(levels) };
+}
+
+/// The gate drivers' ready wire at both break inputs.
+pub fn drivers_ready(registers: &Registers, ready: bool) {
+    write_input(registers.gpiob, u32::from(ready) << 12);
+    write_input(registers.gpioa, u32::from(ready) << 6);
+}
+
+/// The last write to a port's set-and-reset register.
+pub fn written(port: pac::gpio::Gpio) -> u32 {
+    // SAFETY: BSRR is word 6 of the port's block of memory.
+    unsafe { port.as_ptr().cast::<u32>().add(6).read_volatile() }
+}
+
+/// The same; the memory is emptied.
+pub fn take_written(port: pac::gpio::Gpio) -> u32 {
+    // SAFETY: as above.
+    unsafe { port.as_ptr().cast::<u32>().add(6).replace(0) }
+}
+
+/// Counts an encoder whose shaft has turned, in turns from its index on, as the timer does that counts it: from 0 behind the index, whose flag it
+/// sets where the drive looks at it.
+pub fn turn_encoder(timer: pac::timer::TimGp16, per_turn: u32, [before, now]: [f64; 2], count: &mut f64) {
+    let counts = f64::from(per_turn);
+    let passed = before.floor() != now.floor();
+    *count = if passed { now.rem_euclid(1.0) * counts } else { *count + (now - before) * counts };
+    timer.cnt().write(|w| w.set_cnt(count.rem_euclid(counts) as u16));
+    // Flags are cleared by writing 0; writing 1 does nothing. The hardware sets them.
+    let mut status = pac::timer::regs::SrGp16(0);
+    status.set_idxif(passed && timer.ecr().read().ie());
+    timer.sr().write_value(status);
+}
+
+/// The dead time of a timer's code, in cycles.
+pub fn dead_cycles(timer: pac::timer::TimAdv) -> u32 {
+    let code = u32::from(timer.bdtr().read().dtg());
+    let periods = match code {
+        0..0x80 => code,
+        0x80..0xC0 => (64 + (code & 63)) * 2,
+        0xC0..0xE0 => (32 + (code & 31)) * 8,
+        _ => (32 + (code & 31)) * 16,
+    };
+    periods << timer.cr1().read().ckd().to_bits()
+}
+
 /// The control timer's update, TIM3's or, with the ZS9, TIM2's: its TRGO captures the count of an encoder timer whose channel 3 is mapped on
 /// TRC and enabled, and whose TS selects that timer. Internal triggers by the reference manual: 0, 1, 2, 3 are TIM1, TIM2, TIM3,
 /// TIM4 for each of TIM3 and TIM4, its own number left out.
@@ -299,7 +348,8 @@ impl Bench {
     fn drive(&mut self, leg: usize, index: usize, pair: usize) {
         let timer = self.timers()[index];
         let reference = self.reference(timer, index, pair);
-        let (now, dead_ticks) = (self.now, self.generated_dead_ticks(timer));
+        // In whole ticks.
+        let (now, dead_ticks) = (self.now, dead_cycles(timer) / (u32::from(timer.psc().read()) + 1));
         let leg = &mut self.legs[leg];
         if leg.reference != reference {
             (leg.reference, leg.since) = (reference, now);
@@ -334,19 +384,6 @@ impl Bench {
             (4, _) | (0, 0) => false,
             other => panic!("modes {other:?}"),
         }
-    }
-
-    /// The dead time of the register's code, in whole ticks.
-    fn generated_dead_ticks(&self, timer: pac::timer::TimAdv) -> u32 {
-        let code = u32::from(timer.bdtr().read().dtg());
-        let periods = match code {
-            0..0x80 => code,
-            0x80..0xC0 => (64 + (code & 63)) * 2,
-            0xC0..0xE0 => (32 + (code & 31)) * 8,
-            _ => (32 + (code & 31)) * 16,
-        };
-        let cycles = periods << (timer.cr1().read().ckd().to_bits());
-        cycles / (u32::from(timer.psc().read()) + 1)
     }
 
     /// 5 µs at 21.25 MHz, not rounded up: what the power stage asks for.

@@ -1,6 +1,6 @@
 //! The drive's own two tasks on the board in memory.
 
-use crate::bench::{Bench, control_update};
+use crate::bench::{Bench, control_update, write_input};
 use crate::devices;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::position::{Encoder, PositionState};
@@ -48,8 +48,8 @@ fn the_drive_pulses_a_turning_machine_through_the_registers() {
     let mut control_task = ControlTask::new(&BUILT_IN, settings, Instant(CLOCK.control_ticks));
     let mut pwm_task = PwmTask::new(&BUILT_IN, settings, first_half);
     registers.tim4.sr().write(|w| w.set_idxif(true));
-    // SAFETY: IDR is word 4 of the port's block of memory; bit 2 is the enable input.
-    unsafe { registers.gpioc.as_ptr().cast::<u32>().add(4).write_volatile(1 << 2) };
+    // The enable input.
+    write_input(registers.gpioc, 1 << 2);
     let mut enabled = false;
     let (mut changes, mut gates) = (0, bench.legs.map(|leg| leg.gates()));
     for tick in 1..=700_000_u64 {

@@ -1,6 +1,6 @@
 //! The PMaSynRM's whole image on the board in memory, with a machine, an encoder, contactors and a vehicle's computer around it.
 
-use crate::bench::{Bench, control_update};
+use crate::bench::{Bench, control_update, drivers_ready, turn_encoder, write_input};
 use crate::bus::{Bus, Sender};
 use crate::devices;
 use nucleo_g474re::built_in::traction::BUILT_IN;
@@ -9,7 +9,6 @@ use nucleo_g474re::power_stage::{POWER_STAGE, PowerStage};
 use nucleo_g474re::serve::Serve;
 use nucleo_g474re::watchdog::Pulse;
 use nucleo_g474re::{CLOCK, Control, Pwm, start};
-use stm32_metapac::timer::regs::SrGp16;
 use tractive::control::{flux_linkage, torque_nm};
 use tractive::drive::traction::{ControlTask, PwmTask, Settings, Shared};
 use tractive::frames::{Abc, AlphaBeta, Angle, Dq};
@@ -233,19 +232,12 @@ impl Image {
     /// The inputs' levels, and the converters' codes.
     fn wire(&mut self) {
         let registers = self.bench.registers;
-        let ready = u32::from(self.drivers_ready);
         let closed = |(told, since): (bool, Option<u64>)| {
             since.is_some_and(|since| told == (self.periods >= since + CONTACTOR_PERIODS))
         };
         let [precharge, main] = self.told.map(|contact| u32::from(closed(contact)));
-        for (port, levels) in [
-            (registers.gpioa, ready << 6),
-            (registers.gpiob, ready << 12),
-            (registers.gpioc, 1 << 2 | precharge << 4 | main << 5),
-        ] {
-            // SAFETY: IDR is word 4 of the port's block of memory, which only the hardware writes.
-            unsafe { port.as_ptr().cast::<u32>().add(4).write_volatile(levels) };
-        }
+        drivers_ready(&registers, self.drivers_ready);
+        write_input(registers.gpioc, 1 << 2 | precharge << 4 | main << 5);
         self.bench.fault = [!self.drivers_ready; 2];
         self.sense();
     }
@@ -285,19 +277,10 @@ impl Image {
     /// The timer that counts the shaft's encoder, at the end of a control period.
     fn turn(&mut self) {
         let before = core::mem::replace(&mut self.machine.counted, self.machine.turns);
-        let counts = f64::from(POWER_STAGE.encoder_counts);
-        self.machine.count += (self.machine.turns - before) * counts;
-        let passed = before.floor() != self.machine.turns.floor();
-        if passed {
-            self.machine.count = self.machine.turns.rem_euclid(1.0) * counts;
-        }
-        let timer = self.bench.registers.tim4;
-        timer.cnt().write(|w| w.set_cnt(self.machine.count.rem_euclid(counts) as u16));
-        control_update(&self.bench.registers);
-        // Flags are cleared by writing 0; writing 1 does nothing. The hardware sets them.
-        let mut status = SrGp16(0);
-        status.set_idxif(passed && timer.ecr().read().ie());
-        timer.sr().write_value(status);
+        let turned = [before, self.machine.turns];
+        let registers = self.bench.registers;
+        turn_encoder(registers.tim4, POWER_STAGE.encoder_counts, turned, &mut self.machine.count);
+        control_update(&registers);
     }
 
     /// A control period: the timers' ticks with the carrier's interrupts, the control interrupt, the idle loop.

@@ -1,6 +1,6 @@
 //! The exchange between the operator and the board, and the end of a fault.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, drivers_ready, take_written, write_input};
 use crate::devices;
 use crate::temperatures::done;
 use nucleo_g474re::built_in::traction::BUILT_IN;
@@ -11,7 +11,7 @@ use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::serve::{Identifying, Serve, Station};
 use nucleo_g474re::{Control, Pwm, hardware, switchgear};
-use stm32_metapac::gpio::{self, regs::Idr};
+use stm32_metapac::gpio;
 use tractive::experiment::Memory;
 use tractive::modulation::{CarrierHalf, Mode};
 use tractive::operator::{Configuration, Feedback, State, Status, Switches};
@@ -23,15 +23,6 @@ use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);
 
-fn write_input(port: gpio::Gpio, levels: u32) {
-    // SAFETY: IDR is word 4 of the port's block of memory, which only the hardware writes.
-    unsafe { port.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(levels)) };
-}
-
-fn drivers_ready(registers: &Registers, ready: bool) {
-    ready_at(registers, [ready; 2]);
-}
-
 /// The level at either break input.
 fn ready_at(registers: &Registers, [b, a]: [bool; 2]) {
     write_input(registers.gpiob, u32::from(b) << 12);
@@ -40,8 +31,7 @@ fn ready_at(registers: &Registers, [b, a]: [bool; 2]) {
 
 /// The last write to a set-and-reset register, as (set, reset); the memory is emptied.
 fn bits_written(port: gpio::Gpio) -> (u32, u32) {
-    // SAFETY: BSRR is word 6 of the port's block of memory.
-    let word = unsafe { port.as_ptr().cast::<u32>().add(6).replace(0) };
+    let word = take_written(port);
     (word & 0xFFFF, word >> 16)
 }
 

@@ -1,6 +1,6 @@
 //! Every output that switches something on: off from reset on, in every refusal, halt and death.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, written};
 use crate::devices;
 use nucleo_g474re::pins::{Function, PINS, Pin};
 use nucleo_g474re::registers::Registers;
@@ -16,11 +16,7 @@ fn is_high(registers: &Registers, pin: &Pin) -> bool {
     match port.moder().read().moder(number) {
         Moder::ANALOG => false,
         Moder::INPUT => port.pupdr().read().pupdr(number) == Pupdr::PULL_UP,
-        Moder::OUTPUT => {
-            // SAFETY: BSRR is word 6 of the port's block of memory.
-            let written = unsafe { port.as_ptr().cast::<u32>().add(6).read_volatile() };
-            written >> number & 1 != 0
-        }
+        Moder::OUTPUT => written(port) >> number & 1 != 0,
         Moder::ALTERNATE => drives_high(registers, pin),
     }
 }

@@ -1,6 +1,6 @@
 //! The pin table against the chip's own data and against the documentation.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, written};
 use nucleo_g474re::pins::{Function, PINS, Pin, Port};
 use nucleo_g474re::position::{Absolute, Encoder, Position, Resolver};
 use nucleo_g474re::registers::Registers;
@@ -158,9 +158,7 @@ fn an_output_is_high_at_first_and_a_switch_low() {
             Function::Switch => low,
             _ => 0,
         };
-        // SAFETY: BSRR is word 6 of the port's block of memory.
-        let written = unsafe { pin.port.of(&registers).as_ptr().cast::<u32>().add(6).read() };
-        assert_eq!(written, wanted, "{}", name(pin));
+        assert_eq!(written(pin.port.of(&registers)), wanted, "{}", name(pin));
     }
 }
 

@@ -1,6 +1,6 @@
 //! The board as the interrupts see it.
 
-use crate::bench::{Bench, control_update};
+use crate::bench::{Bench, control_update, drivers_ready, write_input};
 use crate::devices;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::legs::SoftwareBreak;
@@ -11,7 +11,6 @@ use nucleo_g474re::sampling::Zeros;
 use nucleo_g474re::start::{self, Wait};
 use nucleo_g474re::watchdog::Pulse;
 use nucleo_g474re::{Control, Pwm};
-use stm32_metapac::gpio::regs::Idr;
 use stm32_metapac::timer::regs::SrGp16;
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
@@ -21,12 +20,6 @@ use tractive::time::Instant;
 
 const NOW: Instant = Instant(0);
 const ZEROS: Zeros = [AdcCode(2_048), AdcCode(2_050), AdcCode(2_040)];
-
-/// Writes a register that only the hardware writes.
-pub fn write_input(port: stm32_metapac::gpio::Gpio, levels: u32) {
-    // SAFETY: IDR is word 4 of the port's block of memory.
-    unsafe { port.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(levels)) };
-}
 
 /// The index passes; the angle is known from the next sample on.
 fn pass_index<P: Position>(control: &mut Control<P>, registers: &Registers) {
@@ -365,8 +358,7 @@ fn what_holds_the_gates_has_a_name() {
         let state = PositionState::new();
         let encoder = Encoder::new(registers.tim4, &POWER_STAGE, &BUILT_IN.ratings);
         let mut control = Control::new(registers, ZEROS, encoder, &state);
-        write_input(registers.gpiob, u32::from(ready) << 12);
-        write_input(registers.gpioa, u32::from(ready) << 6);
+        drivers_ready(&registers, ready);
         spoil(&registers);
         bench.finish_sequence(registers.adc1);
         assert_eq!(control.sample(NOW).hardware, fault, "{what}");

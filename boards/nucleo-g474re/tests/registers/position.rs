@@ -1,8 +1,8 @@
 //! The position sensors that take the encoder's place: what they configure, and the angles that they read.
 
 use crate::bench::Bench;
+use crate::bench::write_input;
 use crate::devices;
-use crate::ports::write_input;
 use nucleo_g474re::Control;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::position::{Absolute, Position, PositionState, Resolver, decoded};

@@ -11,7 +11,7 @@
 //!
 //! ```
 //! use tractive_control::control::{
-//!     AimInput, Committed, ControlLaw, Demand, Gains, Law, ModeLimits, PiLaw, Regulated, RotorSample, flux_linkage, mtpa, torque_nm,
+//!     AimInput, Committed, ControlLaw, Demand, Gains, Law, ModeLimits, PiLaw, RotorSample, flux_linkage, mtpa, torque_nm,
 //! };
 //! use tractive_control::frames::{AlphaBeta, Angle};
 //! use tractive_control::time::Clock;
@@ -20,17 +20,7 @@
 //! let tables = tractive_tablegen::MachineFolder::read(folder)?.tables();
 //! let clock = Clock::new(25_000_000, 2_500);
 //! let law = Law { gains: &Gains::DEFAULT, clock: &clock, tables: &tables };
-//! let limits = ModeLimits {
-//!     follows: Regulated::Mean,
-//!     index_limit: 0.9,
-//!     # steady_limit: 0.9,
-//!     # filled: false,
-//!     # ripple_share: 0.05,
-//!     # ripple_s2: None,
-//!     # settled: true,
-//!     # joins: false,
-//!     // …
-//! };
+//! let limits = ModeLimits::carrier(0.9);
 //! let volt_seconds = Some(AlphaBeta::default());
 //! let committed = Committed { horizon_s: 0.5e-3, volt_seconds, ripple_wb: None, interval_s: 0.5e-3 };
 //! let mut pi = PiLaw::new();
@@ -38,8 +28,7 @@
 //! for _ in 0..20 {
 //!     let demand = Demand { torque_nm: 700.0, slew_limited: false };
 //!     pi.observe(&sample, &tables);
-//!     let input = AimInput { demand: &demand, window: None, udc_v: 1_500.0, change_v: 0.0, link_scale: 1.0, swing: None, iron_share: 0.0, limits: &limits };
-//!     pi.aim(&input, &law);
+//!     pi.aim(&AimInput::plain(&demand, 1_500.0, &limits), &law);
 //! }
 //! let wanted = pi.target().current;
 //! let torque = torque_nm(&tables, flux_linkage(&tables, wanted), wanted);
@@ -130,12 +119,6 @@ impl PiLaw {
             target: Target::NONE,
             limit_v: 0.0,
         }
-    }
-}
-
-impl Default for PiLaw {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -11,6 +11,7 @@ use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use tractive::control::MtpaStart;
 use tractive::modulation::{FREE_CARRIER_SHARE, Ladder};
+use tractive::named;
 use tractive_tablegen::Patterns;
 
 /// The point whose inductances the first pass of MTPA takes under `--law pi`.
@@ -33,14 +34,16 @@ impl StartName {
     }
 }
 
-/// The pulse patterns that the drive uses above the free carrier.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PatternsName {
-    /// The paper's modes
-    Paper,
-    /// Optimised patterns of 15 to 3 pulses
-    Optimal,
+named! {
+    /// The pulse patterns that the drive uses above the free carrier.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum PatternsName {
+        /// The paper's modes
+        Paper => "paper",
+        /// Optimised patterns of 15 to 3 pulses
+        Optimal => "optimal",
+    }
 }
 
 impl From<Patterns> for PatternsName {
@@ -71,14 +74,6 @@ impl PatternsName {
         match self {
             Self::Paper => 1.0,
             Self::Optimal => FREE_CARRIER_SHARE,
-        }
-    }
-
-    /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Optimal => "optimal",
         }
     }
 }

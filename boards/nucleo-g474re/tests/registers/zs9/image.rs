@@ -2,8 +2,8 @@
 //! is looked at is how the parts work together.
 
 use super::model::Model;
-use super::ports::{UNEXPLAINED, converted, drivers_ready};
-use crate::bench::{Bench, control_update};
+use super::ports::{UNEXPLAINED, converted};
+use crate::bench::{Bench, control_update, drivers_ready, turn_encoder, write_input};
 use crate::bus::{Bus, Sender};
 use nucleo_g474re::built_in::zs9::BUILT_IN;
 use nucleo_g474re::position::{Encoder, PositionState};
@@ -12,7 +12,6 @@ use nucleo_g474re::watchdog::Pulse;
 use nucleo_g474re::zs9::serve::DualServe;
 use nucleo_g474re::zs9::stage::STAGE;
 use nucleo_g474re::zs9::{CLOCK, CYCLES_PER_TICK, Control, Pwm, RATINGS, settings, start};
-use stm32_metapac::timer::regs::SrGp16;
 use tractive::drive::dual::{ControlTask, PwmTask, Shared};
 use tractive::frames::Angle;
 use tractive::nine_switch::Scheme;
@@ -155,32 +154,20 @@ impl Image {
             u32::from(since.is_some_and(|since| told == (self.periods >= since + CONTACTOR_PERIODS)))
         });
         let registers = self.model.registers;
-        // SAFETY: IDR is word 4 of the port's block of memory, which only the hardware writes.
-        unsafe {
-            let inputs = registers.gpioc.as_ptr().cast::<u32>().add(4);
-            inputs.write_volatile(1 << 4 | precharge << 5 | main << 12);
-        }
+        write_input(registers.gpioc, 1 << 4 | precharge << 5 | main << 12);
         drivers_ready(&registers, self.drivers_ready);
         self.model.fault = [!self.drivers_ready; 3];
     }
 
     /// Both shafts over a control period, and the timers that count their encoders.
     fn turn(&mut self) {
-        let counts = f64::from(STAGE.common.encoder_counts);
         let timers = [self.model.registers.tim4, self.model.registers.tim3];
         for (index, timer) in timers.into_iter().enumerate() {
             let moved = self.rpm[index] / 60.0 * f64::from(CLOCK.control_s());
             let before = self.turns[index];
             self.turns[index] += moved;
-            self.counts[index] += moved * counts;
-            let passed = before.floor() != self.turns[index].floor();
-            if passed {
-                self.counts[index] = self.turns[index].rem_euclid(1.0) * counts;
-            }
-            timer.cnt().write(|w| w.set_cnt(self.counts[index].rem_euclid(counts) as u16));
-            let mut status = SrGp16(0);
-            status.set_idxif(passed && timer.ecr().read().ie());
-            timer.sr().write_value(status);
+            let turned = [before, self.turns[index]];
+            turn_encoder(timer, STAGE.common.encoder_counts, turned, &mut self.counts[index]);
         }
         control_update(&self.model.registers);
     }

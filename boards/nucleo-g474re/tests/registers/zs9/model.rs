@@ -1,7 +1,7 @@
 //! As much of three up-down timers as the bridge relies on: preload, updates at peak and valley, PWM and combined modes, the
 //! dead-time generators, the main outputs, breaks. After the reference manual, not the board.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, dead_cycles};
 use nucleo_g474re::registers::Registers;
 use nucleo_g474re::zs9::start;
 use stm32_metapac as pac;
@@ -236,18 +236,6 @@ fn references(state: &Timer, timer: pac::timer::TimAdv) -> [bool; 3] {
         _ => plain(odd),
     };
     [combined(0), combined(2), plain(1)]
-}
-
-/// The dead time of the register's code.
-fn dead_cycles(timer: pac::timer::TimAdv) -> u32 {
-    let code = u32::from(timer.bdtr().read().dtg());
-    let periods = match code {
-        0..0x80 => code,
-        0x80..0xC0 => (64 + (code & 63)) * 2,
-        0xC0..0xE0 => (32 + (code & 31)) * 8,
-        _ => (32 + (code & 31)) * 16,
-    };
-    periods << timer.cr1().read().ckd().to_bits()
 }
 
 /// EGR is written by the board and read back by the hardware alone.

@@ -1,8 +1,8 @@
 //! The exchange between the ZS9's operator and the board, and the name and the end of a break.
 
 use super::model::Model;
-use super::ports::{control, converted, drivers_ready, make_ready, zeros};
-use crate::bench::Bench;
+use super::ports::{control, converted, make_ready, zeros};
+use crate::bench::{Bench, drivers_ready, take_written, write_input, written};
 use crate::bus::Bus;
 use nucleo_g474re::built_in::zs9::BUILT_IN;
 use nucleo_g474re::can::Can;
@@ -14,7 +14,6 @@ use nucleo_g474re::switchgear;
 use nucleo_g474re::zs9::hardware::{held_by, latched_by};
 use nucleo_g474re::zs9::serve::DualServe;
 use nucleo_g474re::zs9::{self, CLOCK, Pwm, RATINGS, settings, start};
-use stm32_metapac::gpio::regs::Idr;
 use tractive::drive::dual::{ControlTask, Shared};
 use tractive::nine_switch::Scheme;
 use tractive::operator::{Configuration, DualSlot, Feedback, Line, Settings, State, Switches, slot_s};
@@ -113,9 +112,7 @@ fn the_operator_hears_of_contacts_drivers_and_inputs() {
         configuration: Configuration::Good,
         ..Feedback::default()
     };
-    // SAFETY: IDR is word 4 of the port's block of memory.
-    let inputs =
-        |levels| unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(levels)) };
+    let inputs = |levels| write_input(registers.gpioc, levels);
     for (levels, wanted) in [
         (0, healthy),
         (1 << 4, Feedback { enable_input: true, ..healthy }),
@@ -188,9 +185,7 @@ fn each_slot_is_done_once_and_its_status_is_sent_and_its_switches_are_set() {
     }
     assert_eq!((slots, told.len()), (100, 10));
     assert_eq!(told[0].state, Some(State::SelfTest));
-    // SAFETY: BSRR is word 6 of the port's block of memory.
-    let written = unsafe { idle.registers.gpioc.as_ptr().cast::<u32>().add(6).read() };
-    assert_eq!(written, 1 << 25, "the discharge resistor is off");
+    assert_eq!(written(idle.registers.gpioc), 1 << 25, "the discharge resistor is off");
 }
 
 #[test]
@@ -209,15 +204,13 @@ fn a_start_that_is_refused_is_told_on_the_bus() {
 #[test]
 fn each_switch_has_its_pin() {
     let registers = Model::started().registers;
-    // SAFETY: BSRR is word 6 of the ports' blocks of memory.
-    let written = |port: stm32_metapac::gpio::Gpio| unsafe { port.as_ptr().cast::<u32>().add(6).replace(0) };
     for (switches, [b, c]) in [
         (Switches { precharge: true, ..Switches::default() }, [1 << 10, 1 << 25]),
         (Switches { main: true, ..Switches::default() }, [1 << 15, 1 << 25]),
         (Switches { discharge: true, ..Switches::default() }, [1 << 31, 1 << 9]),
     ] {
-        let _ = [registers.gpiob, registers.gpioc].map(written);
+        let _ = [registers.gpiob, registers.gpioc].map(take_written);
         switchgear::set_wires(&registers, &zs9::pins::SWITCHGEAR, &switches);
-        assert_eq!([registers.gpiob, registers.gpioc].map(written), [b, c], "{switches:?}");
+        assert_eq!([registers.gpiob, registers.gpioc].map(take_written), [b, c], "{switches:?}");
     }
 }

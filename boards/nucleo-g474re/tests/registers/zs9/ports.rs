@@ -1,7 +1,7 @@
 //! The board as the interrupts see it.
 
 use super::model::Model;
-use crate::bench::{Bench, control_update};
+use crate::bench::{Bench, control_update, drivers_ready, take_written, write_input};
 use nucleo_g474re::built_in::zs9::BUILT_IN;
 use nucleo_g474re::outputs::SoftwareBreak;
 use nucleo_g474re::position::{Encoder, PositionState};
@@ -12,7 +12,6 @@ use nucleo_g474re::zs9::sampling::Zeros;
 use nucleo_g474re::zs9::stage::STAGE;
 use nucleo_g474re::zs9::{CLOCK, Control, Pwm, start};
 use stm32_metapac::adc::regs::Isr;
-use stm32_metapac::gpio::regs::Idr;
 use stm32_metapac::spi::vals::{Br, Ds, Mstr};
 use stm32_metapac::timer::regs::SrGp16;
 use stm32_metapac::timer::vals::Dir;
@@ -46,21 +45,10 @@ pub fn permitted(torques_nm: [f32; 2], link_ref_v: f32) -> DualDriveCommand {
 
 /// Enable input, drivers and indices.
 pub fn make_ready(registers: &Registers) {
-    // SAFETY: IDR is word 4 of the port's block of memory; bit 4 is the enable input.
-    unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(1 << 4)) };
+    write_input(registers.gpioc, 1 << 4);
     drivers_ready(registers, true);
     for timer in [registers.tim3, registers.tim4] {
         timer.sr().write(|w| w.set_idxif(true));
-    }
-}
-
-/// The gate drivers' ready wire at both break inputs.
-pub fn drivers_ready(registers: &Registers, ready: bool) {
-    let [b, a] = [u32::from(ready) << 12, u32::from(ready) << 6];
-    // SAFETY: IDR is word 4 of the ports' blocks of memory.
-    unsafe {
-        registers.gpiob.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(b));
-        registers.gpioa.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(a));
     }
 }
 
@@ -121,8 +109,7 @@ fn the_gates_wait_for_both_indices_the_enable_input_and_quiet_breaks() {
         (true, |_| ()),
         (false, |registers| registers.tim3.sr().write(|w| w.set_idxif(false))),
         (false, |registers| registers.tim4.sr().write(|w| w.set_idxif(false))),
-        // SAFETY: IDR is word 4 of the port's block of memory.
-        (false, |registers| unsafe { registers.gpioc.as_ptr().cast::<Idr>().add(4).write_volatile(Idr(0)) }),
+        (false, |registers| write_input(registers.gpioc, 0)),
         (false, |registers| registers.tim20.sr().write(|w| w.set_bif(0, true))),
     ];
     for (enabled, spoil) in cases {
@@ -233,8 +220,7 @@ fn the_driver_board_is_asked_for_two_words_while_it_is_selected() {
     assert_eq!(registers.spi3.cr2().read().ds(), Ds::BITS16);
     assert_eq!((settings.mstr(), settings.br()), (Mstr::MASTER, Br::DIV8));
     assert!(settings.ssm() && settings.ssi() && settings.spe());
-    // SAFETY: BSRR is word 6 of the port's block of memory.
-    let written = || unsafe { registers.gpioa.as_ptr().cast::<u32>().add(6).replace(0) };
+    let written = || take_written(registers.gpioa);
     written();
     registers.spi3.dr16().write_value(0x1234);
     feedback.begin();
