@@ -61,6 +61,15 @@ const OWN: &str = "xtask";
 const OWN_PARTS: [&[&str]; 2] =
     [&["--bins", "--config", "profile.release.package.xtask.opt-level=0"], &["--test", "*"]];
 
+/// Settings of the C library (glibc; others do not heed them) that keep the memory that a program frees for its next use. A recording has many megabytes, and for
+/// each the system would have to make every page anew.
+const MEMORY_KEPT: [(&str, &str); 4] = [
+    ("MALLOC_ARENA_MAX", "1"),
+    ("MALLOC_MMAP_THRESHOLD_", "4294967296"),
+    ("MALLOC_TRIM_THRESHOLD_", "4294967296"),
+    ("MALLOC_TOP_PAD_", "67108864"),
+];
+
 /// The end of a step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Outcome {
@@ -182,7 +191,11 @@ fn host(packages: &[String]) -> Result<bool> {
         [package] if package == OWN => &OWN_PARTS,
         _ => &[&[]],
     };
-    all(parts, |part| succeeds(cargo().args(["test", "--release"]).args(named.clone()).args(*part)))
+    all(parts, |part| {
+        let mut command = cargo();
+        command.args(["test", "--release"]).args(named.clone()).args(*part);
+        succeeds(command.envs(MEMORY_KEPT))
+    })
 }
 
 /// The outcome of a check that may lack a tool; the inner error names it.

@@ -106,6 +106,11 @@ impl Experiment<'_> {
                 break;
             }
         }
+        Ok(fit)
+    }
+
+    /// That fit with what it does not need for itself: the map at standstill, the bends beyond the pulses, and the turning rotor's own flux linkages.
+    fn completed(&self, mut fit: Fit) -> Result<Fit> {
         let boundaries = self.boundaries(Some(&fit));
         fit.still.terms = self.still(&boundaries, &fit)?;
         fit.coenergy.terms = self.onward(&boundaries, &fit)?;
@@ -179,8 +184,12 @@ impl Experiment<'_> {
 /// Observations that do not tell the machine.
 pub fn fit(observations: &[Observation], bound_a: f64, half_s: f64) -> Result<Fit> {
     // The kind of the first half is not told: the one that explains more is it.
-    let tried = [true, false].map(|falls| Experiment { observations, bound_a, half_s, falls }.fit());
-    let [rising, falling] = tried;
-    let (rising, falling) = (rising?, falling?);
-    Ok(if rising.left_wb() < falling.left_wb() { rising } else { falling })
+    let of_kind = |falls| Experiment { observations, bound_a, half_s, falls };
+    let (rising, falling) = (of_kind(true), of_kind(false));
+    let (of_rising, of_falling) = (rising.fit()?, falling.fit()?);
+    if of_rising.left_wb() < of_falling.left_wb() {
+        rising.completed(of_rising)
+    } else {
+        falling.completed(of_falling)
+    }
 }

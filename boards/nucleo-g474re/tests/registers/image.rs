@@ -285,6 +285,7 @@ impl Image {
 
     /// A control period: the timers' ticks with the carrier's interrupts, the control interrupt, the idle loop.
     fn period(&mut self) {
+        let mut phases = self.machine.phases();
         for tick in 1..=u64::from(CLOCK.control_ticks) {
             if self.bench.tick() {
                 self.pwm.acknowledge();
@@ -298,7 +299,6 @@ impl Image {
                 self.pulse.pwm_ran();
                 self.bench.settle();
             }
-            let phases = self.machine.phases();
             for ((sum, leg), current_a) in self.machine.levels.iter_mut().zip(&self.bench.legs).zip(phases) {
                 let (upper, lower) = leg.gates();
                 self.machine.pulsed |= upper || lower;
@@ -308,6 +308,7 @@ impl Image {
             if tick % STEP_TICKS == 0 {
                 self.machine.step(self.udc_v, STEP_TICKS as f32 * CLOCK.tick_s);
                 (self.machine.levels, self.machine.pulsed) = ([0; 3], false);
+                phases = self.machine.phases();
             }
         }
         self.periods += 1;

@@ -24,7 +24,41 @@ struct Timer {
     reload: u16,
     compares: [u16; 4],
     status: u32,
+    output: Output,
 }
+
+/// A timer's outputs, as its registers have them since the board's last call.
+#[derive(Clone, Copy, Debug, Default)]
+struct Output {
+    /// By channel.
+    modes: [u8; 4],
+    /// By gate of the leg, H, M, L: with an output, and with one beside it that has the opposite level.
+    enabled: [bool; 3],
+    paired: [bool; 3],
+    main: bool,
+    dead_cycles: u64,
+}
+
+impl Output {
+    fn of(timer: pac::timer::TimAdv) -> Self {
+        let (main, enabled) = (timer.bdtr().read(), timer.ccer().read());
+        let mode = |channel: usize| {
+            let pair = timer.ccmr_output(channel / 2).read();
+            assert!(pair.ocpe(channel % 2), "channel {channel} is not preloaded");
+            pair.ocm(channel % 2).to_bits()
+        };
+        Self {
+            modes: core::array::from_fn(mode),
+            enabled: CHANNELS.map(|channel| enabled.cce(channel)),
+            paired: CHANNELS.map(|channel| enabled.cce(channel) && enabled.ccne(channel)),
+            main: main.moe(),
+            dead_cycles: dead_cycles(timer).into(),
+        }
+    }
+}
+
+/// The channels of a leg's gates H, M, L.
+const CHANNELS: [usize; 3] = [0, 2, 1];
 
 /// Longest time for which a leg may have a node on no rail: around a valley or a peak it passes at most three states that are each too
 /// short for the dead time, and then waits for it.
@@ -42,6 +76,8 @@ pub struct Model {
     floating_since: [Option<u64>; 3],
     /// Cycles in which a leg was shorted: by the compares, and by the devices.
     pub shorted: [u64; 2],
+    /// `true` if a leg is, likewise.
+    short: [bool; 2],
 }
 
 impl Model {
@@ -58,6 +94,7 @@ impl Model {
             gates: [[Gate::default(); 3]; 3],
             floating_since: [None; 3],
             shorted: [0; 2],
+            short: [false; 2],
         };
         // Followers take over what is preloaded at once, by their own update.
         for (index, timer) in model.pac().into_iter().enumerate().skip(1) {
@@ -96,7 +133,10 @@ impl Model {
                 timer.cr1().modify(|w| w.set_cen(true));
             }
         }
-        self.drive();
+        for (index, timer) in self.pac().into_iter().enumerate() {
+            self.timers[index].output = Output::of(timer);
+        }
+        self.drive(true);
     }
 
     /// One cycle of all timers; whether TIM1 has an interrupt.
@@ -126,7 +166,7 @@ impl Model {
                 if self.timers[0].down { pac::timer::vals::Dir::DOWN } else { pac::timer::vals::Dir::UP };
             first.cr1().modify(|w| w.set_dir(down));
         }
-        self.drive();
+        self.drive(false);
         interrupt
     }
 
@@ -135,32 +175,42 @@ impl Model {
         (self.timers[0].count, self.timers[0].down)
     }
 
-    fn drive(&mut self) {
-        for (leg, timer) in self.pac().into_iter().enumerate() {
-            self.drive_leg(leg, timer);
+    /// Drives the gates of every leg after a call of the board, otherwise of those that change.
+    fn drive(&mut self, called: bool) {
+        let mut changed = false;
+        for leg in 0..3 {
+            let timer = &self.timers[leg];
+            let now = Leg {
+                references: references(timer),
+                gates: &self.gates[leg],
+                output: &timer.output,
+                floats: self.floating_since[leg].is_some(),
+            };
+            if called || now.changes() {
+                let references = now.references;
+                self.drive_leg(leg, references);
+                changed = true;
+            }
         }
-        let shorted = |gates: &dyn Fn(&Gate) -> bool| self.gates.iter().any(|leg| leg.iter().all(gates));
-        let [by_compares, by_devices] = [shorted(&|gate| gate.reference), shorted(&|gate| gate.on)];
-        self.shorted[0] += u64::from(by_compares);
-        self.shorted[1] += u64::from(by_devices);
+        if changed {
+            let shorted = |gates: &dyn Fn(&Gate) -> bool| self.gates.iter().any(|leg| leg.iter().all(gates));
+            self.short = [shorted(&|gate| gate.reference), shorted(&|gate| gate.on)];
+        }
+        self.shorted = core::array::from_fn(|k| self.shorted[k] + u64::from(self.short[k]));
     }
 
-    fn drive_leg(&mut self, leg: usize, timer: pac::timer::TimAdv) {
+    fn drive_leg(&mut self, leg: usize, references: [bool; 3]) {
         let now = self.now;
-        let dead = u64::from(dead_cycles(timer));
-        let references = references(&self.timers[leg], timer);
-        let (main, enabled) = (timer.bdtr().read(), timer.ccer().read());
+        let Output { enabled, paired, main, dead_cycles: dead, .. } = self.timers[leg].output;
         let gates = &mut self.gates[leg];
         let before = *gates;
-        // H, M, L are channels 1, 3, 2.
-        for ((gate, reference), channel) in gates.iter_mut().zip(references).zip([0, 2, 1]) {
+        for (place, (gate, reference)) in gates.iter_mut().zip(references).enumerate() {
             if reference && !gate.reference {
                 gate.rose = now;
             }
             gate.reference = reference;
-            let both = enabled.cce(channel) && enabled.ccne(channel);
-            let delay = if both { dead } else { 0 };
-            let on = main.moe() && enabled.cce(channel) && reference && now >= gate.rose + delay;
+            let delay = if paired[place] { dead } else { 0 };
+            let on = main && enabled[place] && reference && now >= gate.rose + delay;
             if gate.on && !on {
                 gate.went_off = Some(now);
             }
@@ -179,7 +229,7 @@ impl Model {
             "dead time at {now}, leg {leg}: {gates:?}"
         );
         let [h, m, l] = gates.map(|gate| gate.on);
-        let pulsing = gates.iter().any(|gate| gate.reference) && main.moe();
+        let pulsing = gates.iter().any(|gate| gate.reference) && main;
         if !pulsing || LegState::of_gates(h, m, l).is_some() {
             self.floating_since[leg] = None;
         } else {
@@ -214,12 +264,25 @@ fn update(state: &mut Timer, timer: pac::timer::TimAdv) {
     state.compares = core::array::from_fn(|channel| timer.ccr(channel).read().ccr());
 }
 
-fn references(state: &Timer, timer: pac::timer::TimAdv) -> [bool; 3] {
-    let modes = |channel: usize| {
-        let pair = timer.ccmr_output(channel / 2).read();
-        assert!(pair.ocpe(channel % 2), "channel {channel} is not preloaded");
-        pair.ocm(channel % 2).to_bits()
-    };
+/// A leg beside what its timer now asks for.
+struct Leg<'a> {
+    references: [bool; 3],
+    gates: &'a [Gate; 3],
+    output: &'a Output,
+    floats: bool,
+}
+
+impl Leg<'_> {
+    /// `false` if a cycle without a call of the board leaves all its gates as they are, with nothing to judge.
+    fn changes(&self) -> bool {
+        let &Self { references, gates, output: Output { enabled, main, .. }, floats } = self;
+        let waits = |place: usize| *main && enabled[place] && gates[place].reference && !gates[place].on;
+        floats || (0..3).any(|place| gates[place].reference != references[place] || waits(place))
+    }
+}
+
+fn references(state: &Timer) -> [bool; 3] {
+    let modes = |channel: usize| state.output.modes[channel];
     // PWM mode 1: counting up active below the compare, counting down inactive above it.
     let below = |channel: usize| {
         let compare = state.compares[channel];
