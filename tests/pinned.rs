@@ -23,7 +23,7 @@ use tractive::protection::{Fault, MaskedFaults, SafeState};
 use tractive::time::{Clock, Instant};
 
 /// That of the 180 kW drive, and what it takes on 1,500 V.
-const DEAD_TIME: DeadTime = DeadTime { voltage_v: 6.75, time_s: 5e-6 };
+const DEAD_TIME: DeadTime = DeadTime { voltage_v: 6.75, left_share: 0.2, time_s: 5e-6 };
 
 /// Control periods of a walk.
 const PERIODS: u32 = 4_000;

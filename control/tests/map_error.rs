@@ -50,7 +50,8 @@ impl Run {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");
         let tables = MachineFolder::read(&folder).unwrap().tables();
         let clock = Clock::new(25_000_000, 2_500);
-        let (law, warmth, dead) = (Controller::new(), Warmth::NONE, DeadTime { voltage_v: 0.0, time_s: 0.0 });
+        let (law, warmth, dead) =
+            (Controller::new(), Warmth::NONE, DeadTime { voltage_v: 0.0, left_share: 0.2, time_s: 0.0 });
         Self {
             law,
             tables,
@@ -221,14 +222,14 @@ fn what_a_link_sensor_may_be_off_is_its_own_and_far_beyond_the_maps() {
 /// A voltage that the dead time may take says nothing of the magnets, and what its edges may turn says nothing of the link.
 #[test]
 fn what_a_dead_time_may_look_like_is_left_alone() {
-    let dead = DeadTime { voltage_v: 6.75, time_s: 5e-6 };
+    let dead = DeadTime { voltage_v: 6.75, left_share: 0.2, time_s: 5e-6 };
     let learnt = |dead: DeadTime, off: Off, (omega, torque_nm): (f32, f32)| {
         let mut run = Run::new(off);
         run.dead = dead;
         run.drive(omega, torque_nm, 0.5);
         (run.law.map_error(), run.law.link_scale())
     };
-    let none = DeadTime { voltage_v: 0.0, time_s: 0.0 };
+    let none = DeadTime { voltage_v: 0.0, left_share: 0.2, time_s: 0.0 };
     // A quarter of it, at a speed where the magnets' EMF is twelve times all of it; and a sixth of their EMF with a slower rotor.
     for (wb, omega, tells) in [(-0.008, 180.0, false), (-0.08, 180.0, true), (-0.08, 40.0, false)] {
         let off = Off { wb, ..AS_RATED };
@@ -263,7 +264,7 @@ fn a_resistance_that_is_told_is_no_error() {
 fn what_is_known_stays_where_a_dead_time_hides_it() {
     for (wb, omega) in [(-0.08, 60.0), (-0.08, 30.0), (0.05, 60.0)] {
         let mut run = Run::new(Off { wb, ..AS_RATED });
-        run.dead = DeadTime { voltage_v: 6.75, time_s: 5e-6 };
+        run.dead = DeadTime { voltage_v: 6.75, left_share: 0.2, time_s: 5e-6 };
         for torque_nm in [0.0, 300.0, 900.0] {
             run.drive(500.0, torque_nm, 0.3);
         }
