@@ -15,7 +15,6 @@ fn loops_are_designed_for_the_control_period_and_for_two_motors_in_turn() {
         carrier: 0.6,
         observer: 0.04,
         sixth_turn_rad: 2.0 * Gains::DEFAULT.sixth_turn_rad,
-        resistance_doubt: 0.05,
         ..Gains::DEFAULT
     };
     assert_eq!(format!("{:?}", settings.gains), format!("{wanted:?}"));
