@@ -66,6 +66,7 @@ const CRUISE_NM: f64 = 60.0;
 const MOVING_LOAD_NM: f64 = 20.0;
 const INERTIA_KG_M2: f64 = 6.0;
 const LEAD_S: f64 = 0.2;
+const STEP_S: f64 = 1e-3;
 /// From the cruise's beginning, and before its end, in s: there torque and weakening still move.
 const SETTLING_S: f64 = 0.3;
 /// Without the cruise.
@@ -111,7 +112,7 @@ fn orders(phase: &mut Phase, t_s: f64, rpm: f64, course: &Course) -> (f64, f64) 
 
 impl Scenario<Zs9> for Cycle {
     fn trace_step_s(&self, _own: &Zs9Options) -> f64 {
-        1e-3
+        STEP_S
     }
 
     fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
@@ -127,7 +128,11 @@ impl Scenario<Zs9> for Cycle {
             Orders { demands: [torque(one.0), torque(two.0)], loads_nm: [one.1, two.1], enable: true }
         };
         let times_s = (LEAD_S, MOVING_S + cruise_s);
-        Plan { edges: self.edges, ..Plan::driven(times_s, free(INERTIA_KG_M2), from_rpm, operator) }
+        Plan {
+            edges: self.edges,
+            judged_step_s: Some(STEP_S),
+            ..Plan::driven(times_s, free(INERTIA_KG_M2), from_rpm, operator)
+        }
     }
 
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {

@@ -64,6 +64,7 @@ impl Live {
         let held = [(); 2].map(|()| SpeedSource::profile(vec![(0.0, start.speed_rpm)]));
         let plan = Plan {
             line: Some(line::TIMES),
+            judged_step_s: Some(start.step_s),
             ..Plan::driven((0.0, ROOM_S), held, [start.speed_rpm; 2], nothing)
         };
         let bench = bench(plan, &options, machine)?.endless();

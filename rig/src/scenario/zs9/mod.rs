@@ -93,6 +93,8 @@ pub struct Plan {
     pub lead_s: f64,
     /// Length of the recording, in s.
     pub duration_s: f64,
+    /// Step of the rows that figures are taken from, in s, however densely the trace is written; `None`: a carrier period.
+    pub judged_step_s: Option<f64>,
     /// The rotors' drive.
     pub speeds: [SpeedSource; 2],
     /// Speeds of free rotors at the beginning, in r/min.
@@ -113,7 +115,16 @@ impl Plan {
         from_rpm: [f64; 2],
         operator: impl Operator + Send + 'static,
     ) -> Self {
-        Self { lead_s, duration_s, speeds, from_rpm, operator: Box::new(operator), edges: true, line: None }
+        Self {
+            lead_s,
+            duration_s,
+            judged_step_s: None,
+            speeds,
+            from_rpm,
+            operator: Box::new(operator),
+            edges: true,
+            line: None,
+        }
     }
 }
 
@@ -234,10 +245,11 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     {
         bail!("--inject at {} s: must be within the run, which ends at {duration_s} s", injection.at_s);
     }
-    let trace_step_s = options.dt.unwrap_or(Zs9::trace_step_s(&options.own));
+    let judged_step_s = plan.judged_step_s.unwrap_or(Zs9::trace_step_s(&options.own));
+    let written_step_s = options.dt.unwrap_or(judged_step_s);
     let (shortest_s, longest_s) = (CLOCK.tick_s, duration_s);
-    if trace_step_s < f64::from(shortest_s) || trace_step_s > longest_s {
-        bail!("--dt {trace_step_s}: must be a number from {shortest_s} to {longest_s}");
+    if written_step_s < f64::from(shortest_s) || written_step_s > longest_s {
+        bail!("--dt {written_step_s}: must be a number from {shortest_s} to {longest_s}");
     }
     let source_v = options.udc.unwrap_or(SOURCE_V);
     let drops = options.own.device_drop.unwrap_or_default().devices();
@@ -253,7 +265,7 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
         carrier_ticks: settings::carrier_ticks(&CLOCK, carrier_hz),
         lead_s,
         duration_s,
-        trace_step_s,
+        trace_step_s: judged_step_s,
         link_ref_v,
         scheme,
         flaws: options.flaws(machine.folder.parameters.trip_current_a),
@@ -262,7 +274,8 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
         edges: plan.edges,
         dead_time_s: options.dead_time_us * 1e-6,
     };
-    Ok(Bench::new(plant, plan.operator, settings).with_line(plan.line))
+    let bench = Bench::new(plant, plan.operator, settings).with_line(plan.line);
+    Ok(if written_step_s == judged_step_s { bench } else { bench.writing_every(written_step_s) })
 }
 
 /// Free rotors, loaded by what the operator says.

@@ -13,11 +13,13 @@ pub const SPEEDS_RPM: [f64; 2] = [1000.0, 700.0];
 const POLE_PAIRS: f64 = 4.0;
 const TORQUE_NM: f64 = 60.0;
 const DURATION_S: f64 = 0.3;
+/// A coarser step would average ripple away.
+const STEP_S: f64 = 1e-6;
 const LEAD_S: f64 = 0.5;
 
 impl Scenario<Zs9> for Steady {
     fn trace_step_s(&self, _own: &Zs9Options) -> f64 {
-        1e-6
+        STEP_S
     }
 
     fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
@@ -30,7 +32,8 @@ impl Scenario<Zs9> for Steady {
             }
         };
         let speeds = SPEEDS_RPM.map(|rpm| SpeedSource::profile(vec![(0.0, rpm)]));
-        Plan::driven((LEAD_S, DURATION_S), speeds, SPEEDS_RPM, operator)
+        let plan = Plan::driven((LEAD_S, DURATION_S), speeds, SPEEDS_RPM, operator);
+        Plan { judged_step_s: Some(STEP_S), ..plan }
     }
 
     fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
