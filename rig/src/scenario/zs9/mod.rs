@@ -6,6 +6,7 @@ pub(super) mod load_step;
 mod patterns;
 mod prelude;
 pub(super) mod reverse;
+mod scaled;
 pub(super) mod steady;
 pub(super) mod timing;
 
@@ -130,7 +131,7 @@ impl Plan {
 
 impl System for Zs9 {
     const NAME: &'static str = "zs9";
-    const MACHINE: &'static str = "ipm-zs9";
+    const MACHINE: &'static str = scaled::MACHINE;
     type Own = Zs9Options;
     type Plan = Plan;
     type Recording = Recording;
@@ -143,7 +144,10 @@ impl System for Zs9 {
         f64::from(own.carrier_hz).recip()
     }
 
-    fn check(options: &Options, _scenario: &Map<String, Value>, machine: &Machine) -> Result<()> {
+    fn check(options: &Options, scenario: &Map<String, Value>, machine: &Machine) -> Result<()> {
+        if let Some(step_nm) = scenario.get("step").and_then(Value::as_f64) {
+            scaled::check_step(step_nm, machine)?;
+        }
         let source_v = options.udc.unwrap_or(SOURCE_V);
         let link_ref_v = options.own.uin;
         if source_v > LARGEST_V {
@@ -286,12 +290,14 @@ pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
 /// Link voltage from which figures are judged, in V: the lowest at which bounds are known. At less the link's own are farther off.
 pub const LEAST_JUDGED_V: f64 = 667.0;
 
-/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported.
+/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported; but
+/// one that never came, where nothing was injected, falls short of any bound.
 pub fn judge(figures: &Figures, options: &Options, bounds: &[(&str, &str, f64)]) -> Vec<Verdict> {
     let judged = options.own.uin >= LEAST_JUDGED_V && options.own.device_drop.is_none();
     let verdict = |(what, name, at_most): &(&str, &str, f64)| {
         let at_most = if judged { bound(options, *at_most, f64::INFINITY) } else { f64::INFINITY };
-        Verdict::at_most(what, figures.number(name), at_most)
+        let verdict = Verdict::at_most(what, figures.number(name), at_most);
+        if options.own.inject.is_some() { verdict } else { verdict.wanted() }
     };
     bounds.iter().map(verdict).collect()
 }
