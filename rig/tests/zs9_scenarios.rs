@@ -299,6 +299,7 @@ fn the_trace_has_its_columns_and_is_written_whole() {
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("summary.json")).unwrap()).unwrap();
     assert_eq!(summary["machine"], "ipm-zs9");
     assert_eq!(summary["options"]["carrier_hz"], 10_000);
+    assert_eq!(summary["options"]["udc"], 400.0);
 }
 
 /// Distortion of a phase current over so many periods of its fundamental, in percent.

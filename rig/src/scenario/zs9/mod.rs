@@ -34,7 +34,7 @@ use crate::zs9::run::{Tasks, run_in_qemu};
 use crate::zs9::trace::Recording;
 use crate::zs9::{Operator, figures, settings};
 use anyhow::{Result, bail};
-use clap::Args;
+use clap::{Args, Command};
 use core::f64::consts::TAU;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -144,7 +144,15 @@ impl System for Zs9 {
         f64::from(own.carrier_hz).recip()
     }
 
+    fn tailored(command: Command) -> Command {
+        let udc = format!("Voltage of the DC source, in V; default {SOURCE_V}");
+        command.mut_arg("udc", |arg| arg.help(udc)).mut_arg("min_pulse_us", |arg| arg.hide(true))
+    }
+
     fn check(options: &Options, scenario: &Map<String, Value>, machine: &Machine) -> Result<()> {
+        if options.min_pulse_us.is_some() {
+            bail!("--min-pulse-us: the ZS9's scenarios do not have this option");
+        }
         if let Some(step_nm) = scenario.get("step").and_then(Value::as_f64) {
             scaled::check_step(step_nm, machine)?;
         }
@@ -245,9 +253,9 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     let Plan { lead_s, duration_s, .. } = plan;
     let Zs9Options { carrier_hz, uin: link_ref_v, scheme, inject, .. } = options.own;
     if let Some(injection) = inject
-        && injection.at_s > duration_s
+        && !(0.0..=duration_s).contains(&injection.at_s)
     {
-        bail!("--inject at {} s: must be within the run, which ends at {duration_s} s", injection.at_s);
+        bail!("--inject at {} s: must be within the run, from 0 to {duration_s} s", injection.at_s);
     }
     let judged_step_s = plan.judged_step_s.unwrap_or(Zs9::trace_step_s(&options.own));
     let written_step_s = options.dt.unwrap_or(judged_step_s);
