@@ -109,8 +109,15 @@ fn refused(line: &str, words: &[&str]) {
     assert!(words.iter().all(|word| said.contains(word)), "{line}: no {words:?} in {said}");
 }
 
-/// A load that the machine cannot carry is refused.
+/// A load that the machine cannot carry, and machines that the drive cannot have, are refused by what their user has.
 #[test]
-fn a_step_beyond_the_largest_torque_is_refused() {
+fn what_the_zs9_cannot_have_is_refused_by_the_users_own_key() {
     refused("run zs9-load-step --step 100", &["--step 100", "-180 to 60"]);
+    refused("run zs9-steady --machine pmsm-48v-1kw", &["max_torque_nm 2.382", "at least 5.60", "ZS9"]);
+    let place = tempfile::tempdir().unwrap();
+    let light = machine(place.path(), "light", &THREE.replace("--inertia 0.1", "--inertia 0.02"));
+    let line = format!("run zs9-steady --machine {}", light.display());
+    refused(&line, &["rotor_inertia_kg_m2 0.02", "at least 0.0", "8000 rad/s²"]);
+    let output = rig(&line);
+    assert!(!String::from_utf8_lossy(&output.stderr).contains("--control-hz"), "the ZS9 has none");
 }

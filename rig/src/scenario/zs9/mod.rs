@@ -26,7 +26,7 @@ use crate::options::{On, positive};
 use crate::plant::SpeedSource;
 use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
 use crate::report::Page;
-use crate::run::{CLOCK, Supervisor, on_host, refused};
+use crate::run::{CLOCK, Supervisor, on_host};
 use crate::verdict::{Verdict, bound};
 use crate::zs9::bench::{Bench, BenchSettings};
 use crate::zs9::line::LineTimes;
@@ -189,10 +189,10 @@ impl System for Zs9 {
         let settings = settings::drive(CLOCK, options.own.carrier_hz);
         let told_us = if options.own.uncompensated { 0.0 } else { options.dead_time_us };
         let settings = settings::with_dead_time(settings, told_us * 1e-6);
+        settings::check(&settings, machine)?;
         let (on, law) = options.choice()?;
         match on {
             On::Host => {
-                settings.check(machine.tables).map_err(refused)?;
                 let ratings = settings.operator_ratings(&machine.tables.ratings);
                 let line = line.map(|times| {
                     Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
