@@ -121,3 +121,24 @@ fn what_the_zs9_cannot_have_is_refused_by_the_users_own_key() {
     let output = rig(&line);
     assert!(!String::from_utf8_lossy(&output.stderr).contains("--control-hz"), "the ZS9 has none");
 }
+
+/// Drops and dead time of `--real` are those of the link that is there and of the carrier that is asked for.
+#[test]
+fn real_flaws_are_those_of_the_zs9s_own_link_and_carrier() {
+    let filled = |line: &str| {
+        let chosen = catalogue::of_zs9(line).unwrap();
+        chosen.filled(&chosen.machine().unwrap())
+    };
+    let slow = filled("zs9-steady --real");
+    assert!((slow.own.device_drop.unwrap().0[0] / 2.0 - 533.5 / 1500.0).abs() < 1e-9);
+    assert!((slow.dead_time_us - 0.45).abs() < 1e-9);
+    let fast = filled("zs9-steady --real --carrier-hz 20000 --uin 800");
+    assert!((fast.own.device_drop.unwrap().0[0] - 0.8).abs() < 1e-9);
+    assert!((fast.dead_time_us - 0.225).abs() < 1e-9);
+    // A tenth of the capacitors' voltage.
+    refused("run zs9-steady --device-drop 60,5,1,3", &["--device-drop 60", "53.3"]);
+    assert!(catalogue::of_zs9("zs9-steady --device-drop 50,5,1,3").is_ok_and(|chosen| {
+        let machine = chosen.machine().unwrap();
+        chosen.options.own.device_drop.unwrap().check(533.5, &machine).is_ok()
+    }));
+}

@@ -15,7 +15,7 @@ pub use load_step::INERTIA_KG_M2;
 pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
 use super::System;
-use super::traction::flaws::{Drops, real_drops, real_run};
+use super::traction::flaws::{Drops, RealInverter};
 use crate::analysis::Figures;
 use crate::bench::Limits;
 use crate::inject::Injection;
@@ -164,7 +164,8 @@ impl System for Zs9 {
         if !(source_v..=LARGEST_V).contains(&link_ref_v) {
             bail!("--uin {link_ref_v}: must be from the source's {source_v} V to {LARGEST_V} V");
         }
-        options.own.device_drop.unwrap_or_default().check(machine)?;
+        let link_v = capacitor_v(options);
+        options.own.device_drop.unwrap_or_default().check(link_v, machine)?;
         options.check_flaws(machine, source_v)
     }
 
@@ -172,9 +173,11 @@ impl System for Zs9 {
         if !options.own.real {
             return options.clone();
         }
-        let device_drop = options.own.device_drop.or(Some(real_drops(machine)));
+        let inverter = RealInverter { link_v: capacitor_v(options), ..RealInverter::of(machine) };
+        let inverter = RealInverter { switching_hz: options.own.carrier_hz.into(), ..inverter };
+        let device_drop = options.own.device_drop.or(Some(inverter.drops(machine)));
         let own = Zs9Options { device_drop, ..options.own.clone() };
-        Options { run: real_run(&options.run, machine), own }
+        Options { run: inverter.run(&options.run, machine), own }
     }
 
     fn run(
@@ -288,6 +291,11 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     };
     let bench = Bench::new(plant, plan.operator, settings).with_line(plan.line);
     Ok(if written_step_s == judged_step_s { bench } else { bench.writing_every(written_step_s) })
+}
+
+/// Voltage of the capacitors that is wanted, in V: of it are the link's pulses.
+fn capacitor_v(options: &Options) -> f64 {
+    0.5 * (options.own.uin + options.udc.unwrap_or(SOURCE_V))
 }
 
 /// Free rotors, loaded by what the operator says.
