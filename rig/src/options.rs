@@ -66,6 +66,10 @@ pub fn finite(text: &str) -> Result<f64, String> {
     number(text, "a finite number", |_| true)
 }
 
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("must be a whole number from 0 to {}", u64::MAX))
+}
+
 /// Options of every run.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct RunOptions {
@@ -86,7 +90,7 @@ pub struct RunOptions {
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub dt: Option<f64>,
     /// Seed of the noise.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// Print the summary as JSON.
     #[serde(skip)]

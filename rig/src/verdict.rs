@@ -34,6 +34,12 @@ impl Verdict {
         Self { what: what.to_owned(), found, at_most, verdict }
     }
 
+    /// The same of a figure that has to come: where the run held nothing of the kind, it falls short.
+    pub fn wanted(self) -> Self {
+        let verdict = if self.verdict == NOT_SEEN { FALLS_SHORT } else { self.verdict };
+        Self { verdict, ..self }
+    }
+
     /// Something that must not be, as 0 or 1.
     pub fn never(what: &str, is: bool) -> Self {
         Self::at_most(what, f64::from(u8::from(is)), 0.0)
@@ -73,6 +79,10 @@ mod tests {
         assert_eq!(verdict(Some(f64::NAN), f64::INFINITY), "reported");
         assert_eq!(verdict(None, 1.0), NOT_SEEN);
         assert_eq!(verdict(None, f64::INFINITY), NOT_SEEN);
+        for at_most in [1.0, f64::INFINITY] {
+            assert_eq!(Verdict::at_most("", None, at_most).wanted().verdict, FALLS_SHORT);
+        }
+        assert_eq!(Verdict::at_most("", 1.0, f64::INFINITY).wanted().verdict, "reported");
     }
 
     #[test]

@@ -175,6 +175,12 @@ fn options_that_do_nothing_are_refused() {
     refused_in_one_line("run sweep --step 40", &["--step", "sweep"]);
     refused_in_one_line("run zs9-load-step --ablate trim", &["--ablate", "zs9-load-step"]);
     refused_in_one_line("run zs9-load-step --inject source-short@1.3", &["--inject", "1.3 s", "1.2 s"]);
+    refused_in_one_line(
+        "run zs9-load-step --inject overcurrent@-0.1",
+        &["--inject", "-0.1 s", "from 0 to 1.2 s"],
+    );
+    refused_in_one_line("run zs9-steady --min-pulse-us 3", &["--min-pulse-us", "ZS9"]);
+    refused("run zs9-steady --seed -1", &["--seed", "must be a whole number from 0"]);
 }
 
 /// Each scenario's help has its own options and no others.
@@ -190,6 +196,7 @@ fn help_shows_what_the_scenario_takes() {
     assert!(!sweep.contains("--step") && !sweep.contains("--scheme"), "{sweep}");
     let zs9 = help("run zs9-load-step -h");
     assert!(zs9.contains("--step") && zs9.contains("--scheme") && !zs9.contains("--down"), "{zs9}");
+    assert!(zs9.contains("default 400") && !zs9.contains("--min-pulse-us"), "{zs9}");
     let all = help("run --help");
     assert!(all.contains("zs9-cycle") && all.contains("--dead-time-us") && !all.contains("--down"), "{all}");
 }

@@ -29,7 +29,10 @@ impl Figures {
         figures.set("fault", name_of(trip));
         if let Some(trip) = trip {
             figures.set("fault_value", trip.value);
-            figures.set("fault_limit", trip.limit);
+            // What is no number breaks any limit.
+            if trip.limit < f32::MAX {
+                figures.set("fault_limit", trip.limit);
+            }
         }
         figures.set("peak_current_a", peak_current_a);
         figures

@@ -36,6 +36,7 @@ pub use error::BenchError;
 pub use inverter::{Inverter, Stuck};
 pub use line::{Commander, LinePlan, LineSide};
 pub use observe::{Limits, Observed, Peaks, Stored};
+pub(crate) use rows::Rows;
 pub use sampling::Sampled;
 pub use sensors::{Converter, Flaws, Sensors};
 pub use settings::{Operator, Settings};
@@ -50,7 +51,6 @@ use crate::plant::{Heat, Plant};
 use crate::trace::{Extremes, Found, Row, SlotRow, Switch};
 use dc_side::DcSide;
 use hold::Holds;
-use rows::Rows;
 use tractive::identification::Observation;
 use tractive::modulation::CarrierHalf;
 use tractive::operator::{Feedback, Request, Status};
@@ -84,8 +84,8 @@ pub struct Bench {
     control: Conversions<Sampled, Report>,
     loads: Due<f64>,
     /// The rows that are judged, and the others that are written.
-    rows: Rows,
-    written: Option<Rows>,
+    rows: Rows<Row>,
+    written: Option<Rows<Row>>,
     /// Extremes since the last row that is judged.
     extremes: Extremes,
     switches: Vec<Switch>,

@@ -78,8 +78,8 @@ impl Bench {
 
     pub(super) fn record(&mut self) {
         self.control.show(self.time.now);
-        let row = |rows: &Rows| (self.time.now <= self.end).then(|| self.row(rows.next_s()));
-        let due = |rows: &Rows| rows.next == self.time.now;
+        let row = |rows: &Rows<Row>| (self.time.now <= self.end).then(|| self.row(rows.next_s()));
+        let due = |rows: &Rows<Row>| rows.next == self.time.now;
         let judged = due(&self.rows).then(|| row(&self.rows));
         let written = self.written.as_ref().filter(|rows| due(rows)).map(row);
         if let Some(row) = judged {

@@ -129,9 +129,8 @@ fn look(name: &str, index: usize) -> (&'static str, Style) {
         "ic" | "c" => ("w", Style::Plain),
         "udc" | "U_in" => ("link", Style::Plain),
         "speed" => ("speed", Style::Plain),
-        "demand" | "after limits" | "telemetry" | "telemetry 1" | "telemetry 2" | "id*" | "iq*" => {
-            ("text", Style::Dashed)
-        }
+        "demand" | "demand 1" | "demand 2" | "after limits" | "telemetry" | "telemetry 1" | "telemetry 2"
+        | "id*" | "iq*" => ("text", Style::Dashed),
         "motor 2" | "lower motor" => ("u", Style::Dashed),
         _ => (INKS[index % INKS.len()], Style::Plain),
     }

@@ -51,6 +51,10 @@ pub const fn unit(fault: Fault) -> &'static str {
 /// A fault with the value that broke its limit.
 pub fn broken(trip: Trip) -> String {
     let of = |value: f32| measured(&json!(f64::from(value)), unit(trip.fault));
+    // What is no number breaks any limit.
+    if !trip.value.is_finite() {
+        return format!("{}: a value that is no number", trip.fault.name());
+    }
     format!("{}: {}, limit {}", trip.fault.name(), of(trip.value), of(trip.limit))
 }
 
@@ -217,6 +221,8 @@ mod tests {
         let trip = Trip { fault, value: 2200.0, limit: 2070.0, at, safe };
         let told = "FALLS SHORT: the drive tripped, dc_overvoltage: 2200 V, limit 2070 V";
         assert_eq!(headline(&Figures::default(), Some(trip)), told);
+        let trip = Trip { fault: Fault::NotFinite, value: f32::NAN, limit: f32::MAX, at, safe };
+        assert_eq!(broken(trip), "not_finite: a value that is no number");
     }
 
     #[test]

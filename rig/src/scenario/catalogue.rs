@@ -60,13 +60,14 @@ impl<S: System> Entry<S> {
     /// Its command line.
     fn command(&self) -> Command {
         let command = Command::new("run").arg(scenario_argument());
-        let command = (self.arguments)(Options::<S::Own>::augment_args(command));
+        let command = (self.arguments)(S::tailored(Options::<S::Own>::augment_args(command)));
         command.about(self.figure).long_about(None)
     }
 
     /// Its command line under its own name.
     fn named(&self) -> Command {
-        let command = (self.arguments)(Options::<S::Own>::augment_args(Command::new(self.name)));
+        let command = S::tailored(Options::<S::Own>::augment_args(Command::new(self.name)));
+        let command = (self.arguments)(command);
         command.about(self.figure).long_about(None)
     }
 

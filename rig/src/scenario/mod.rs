@@ -9,12 +9,12 @@ pub mod zs9;
 
 use crate::analysis::Figures;
 use crate::machine::Machine;
-use crate::options::{Options, RunOptions, USUAL_MIN_PULSE_US};
+use crate::options::{Options, RunOptions};
 use crate::report::{NO_FIGURE, Page};
 use crate::run::Supervisor;
 use crate::trace::Recorded;
 use anyhow::Result;
-use clap::Args;
+use clap::{Args, Command};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -37,9 +37,13 @@ pub trait System: Sized + 'static {
     fn source_v(machine: &Machine) -> f64 {
         machine.folder.parameters.dc_link_nominal_v
     }
-    /// Shortest pulse unless the options say another, in µs.
-    fn min_pulse_us(_machine: &Machine) -> f64 {
-        USUAL_MIN_PULSE_US
+    /// Shortest pulse unless the options say another, in µs; `None` where the modulator knows none.
+    fn min_pulse_us(_machine: &Machine) -> Option<f64> {
+        None
+    }
+    /// A scenario's command line as this system has it: without the options of all runs that are nothing to it.
+    fn tailored(command: Command) -> Command {
+        command
     }
     /// The options with what those stand for that name others.
     fn filled(options: &Options<Self::Own>, _machine: &Machine) -> Options<Self::Own> {
@@ -122,7 +126,7 @@ impl<S: System> Choice<S> {
         figures
     }
 
-    /// The options with the step of the trace that the scenario takes, and the shortest pulse, where none was given.
+    /// The options with the step of the trace that the scenario takes, the source's voltage and the shortest pulse, where none was given.
     pub fn filled(&self, machine: &Machine) -> Options<S::Own> {
         filled(self.scenario.as_ref(), &self.options, machine)
     }
@@ -145,9 +149,10 @@ fn filled<S: System, T: Scenario<S> + ?Sized>(
     machine: &Machine,
 ) -> Options<S::Own> {
     let dt = Some(options.dt.unwrap_or_else(|| scenario.trace_step_s(&options.own)));
-    let min_pulse_us = Some(options.min_pulse_us.unwrap_or_else(|| S::min_pulse_us(machine)));
+    let min_pulse_us = options.min_pulse_us.or_else(|| S::min_pulse_us(machine));
+    let udc = Some(options.udc.unwrap_or_else(|| S::source_v(machine)));
     let Options { run, own } = S::filled(options, machine);
-    Options { run: RunOptions { dt, min_pulse_us, ..run }, own }
+    Options { run: RunOptions { dt, min_pulse_us, udc, ..run }, own }
 }
 
 /// Drives a scenario with options that are within their ranges.

@@ -116,6 +116,7 @@ pub(crate) fn with_zs9(
     let plan = dual::Plan {
         edges: false,
         line: Some(zs9::line::TIMES),
+        judged_step_s: own.dt,
         ..dual::Plan::driven(times_s, dual::free(options.inertia()), [0.0; 2], operator)
     };
     Zs9::run("talk", plan, &own, machine, Some(supervisor))

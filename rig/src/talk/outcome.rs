@@ -71,7 +71,6 @@ fn dressed(command: Command, system: System) -> Command {
 }
 
 /// The recording of what really happened, by system.
-#[expect(clippy::large_enum_variant, reason = "there is one in a run")]
 pub enum Happened {
     /// Of the PMaSynRM drive.
     Pmasynrm(Recording),

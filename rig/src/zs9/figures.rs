@@ -18,6 +18,9 @@ pub type Heading<'a> = (&'a str, &'a str, &'a str);
 /// The motors' torques.
 pub const TORQUES: [Curve; 2] =
     [("motor 1", |row| row.motors[0].torque_nm), ("motor 2", |row| row.motors[1].torque_nm)];
+/// The torques that control wants of the motors.
+pub const DEMANDS: [Curve; 2] =
+    [("demand 1", |row| row.motors[0].torque_ref_nm), ("demand 2", |row| row.motors[1].torque_ref_nm)];
 /// The motors' speeds.
 pub const SPEEDS: [Curve; 2] =
     [("motor 1", |row| row.motors[0].speed_rpm), ("motor 2", |row| row.motors[1].speed_rpm)];

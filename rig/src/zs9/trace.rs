@@ -78,8 +78,10 @@ pub struct Row {
 
 /// A whole run.
 pub struct Recording {
-    /// Rows of the trace.
+    /// Rows of the trace, at the step at which they are judged.
     pub rows: Vec<Row>,
+    /// Rows of trace.csv, where it has another step.
+    pub written: Option<Vec<Row>>,
     /// `true` if edges were kept.
     pub keeps_edges: bool,
     /// Those edges.
@@ -134,9 +136,14 @@ fn recorder_columns((t_s, record): &(f64, DualRecord)) -> Columns<20> {
 }
 
 impl Recording {
+    /// Rows of trace.csv.
+    pub fn written(&self) -> &[Row] {
+        self.written.as_ref().unwrap_or(&self.rows)
+    }
+
     /// The bytes of trace.csv.
     pub fn trace_bytes(&self) -> Result<Vec<u8>> {
-        bytes_of_rows(self.rows.iter().map(Row::columns))
+        bytes_of_rows(self.written().iter().map(Row::columns))
     }
 }
 
@@ -155,7 +162,7 @@ impl Recorded for Recording {
     }
 
     fn write_trace(&self, path: &Path) -> Result<()> {
-        write_rows(path, self.rows.iter().map(Row::columns))
+        write_rows(path, self.written().iter().map(Row::columns))
     }
 
     fn write_recorder(&self, path: &Path) -> Result<()> {

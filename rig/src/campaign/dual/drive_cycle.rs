@@ -109,7 +109,7 @@ impl Drive {
             observed: bench.observed,
             trip: tasks.trip(),
             ended_s: bench.time_s(),
-            rows: bench.rows,
+            rows: bench.take().0,
         })
     }
 }

@@ -75,7 +75,7 @@ impl Drive {
             let safe_s = bench.observed.safe.map(|(at, _)| at as f64 * tick_s - LEAD_S);
             safe_s.is_none_or(|safe_s| bench.time_s() < safe_s + STAGES.aftermath_s)
         })?;
-        let rows = &bench.rows;
+        let rows = bench.rows();
         let seen = Seen {
             observed: bench.observed,
             trip: tasks.trip(),

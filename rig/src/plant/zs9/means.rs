@@ -39,7 +39,7 @@ pub struct Seen {
     pub speed_rpm: f64,
 }
 
-/// Adds up values between two reports.
+/// Sums of values times their time, over a span.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Adder {
     span_s: f64,
@@ -72,6 +72,20 @@ impl Adder {
             self.vectors[k].alpha += half_s * (a.vector.alpha + b.vector.alpha);
             self.vectors[k].beta += half_s * (a.vector.beta + b.vector.beta);
             self.speeds[k] += half_s * (a.speed_rpm + b.speed_rpm);
+        }
+    }
+
+    /// The sums of a span that follows this one.
+    pub fn append(&mut self, later: &Self) {
+        self.span_s += later.span_s;
+        for (sum, part) in self.areas.iter_mut().zip(later.areas) {
+            *sum += part;
+        }
+        for k in 0..2 {
+            self.impulses_nm_s[k] += later.impulses_nm_s[k];
+            self.vectors[k].alpha += later.vectors[k].alpha;
+            self.vectors[k].beta += later.vectors[k].beta;
+            self.speeds[k] += later.speeds[k];
         }
     }
 

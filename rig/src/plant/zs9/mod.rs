@@ -23,13 +23,12 @@ mod step;
 pub use super::motor::{Motor, MotorEnergies};
 pub use super::vector::Vector;
 pub use bridge::{IllegalState, LegGates};
-pub use means::{Means, MotorMeans};
+pub use means::{Adder, Means, MotorMeans};
 pub use network::{NetworkState, ZNetwork};
 
 use super::legs::{Clamp, LONGEST_STEP_S};
 use super::{DeviceDrops, PlantSettings, SpeedSource};
 use bridge::Bridge;
-use means::Adder;
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
 /// Link voltage for which steps are short enough at least, in V.
@@ -207,7 +206,12 @@ impl Zs9Plant {
 
     /// Mean values since this was last called; `None` if no time has passed.
     pub fn take_means(&mut self) -> Option<Means> {
-        std::mem::take(&mut self.means).means(self.source_v)
+        self.take_sums().means(self.source_v)
+    }
+
+    /// The sums that those are made of, since this was last called.
+    pub fn take_sums(&mut self) -> Adder {
+        std::mem::take(&mut self.means)
     }
 
     /// Longest step while all gates are off, in s: short near a current at which a diode begins or ends to conduct.

@@ -37,11 +37,9 @@ impl FromStr for Drops {
 }
 
 impl Drops {
-    /// The check that they are within their ranges for a machine.
-    pub fn check(&self, machine: &Machine) -> Result<()> {
-        let parameters = &machine.folder.parameters;
-        let link_v = parameters.dc_link_nominal_v;
-        let most_mohm = 1e3 * link_v / parameters.max_current_a;
+    /// The check that they are within their ranges for a link of so many V and a machine.
+    pub fn check(&self, link_v: f64, machine: &Machine) -> Result<()> {
+        let most_mohm = 1e3 * link_v / machine.folder.parameters.max_current_a;
         let Self([igbt_v, igbt_mohm, diode_v, diode_mohm]) = *self;
         within(&[
             ("--device-drop", igbt_v, 0.0, 0.1 * link_v),
@@ -237,23 +235,46 @@ pub struct Filled {
     pub flaws: FlawOptions,
 }
 
-/// By how much shorter times are in a machine whose devices switch faster.
-fn shorter(machine: &Machine) -> f64 {
-    (real::SWITCHING_HZ / machine.folder.parameters.max_switching_hz).min(1.0)
+/// The inverter that `--real` has the flaws of.
+#[derive(Clone, Copy, Debug)]
+pub struct RealInverter {
+    /// Voltage that its devices switch, in V.
+    pub link_v: f64,
+    /// The rate at which they do, in Hz.
+    pub switching_hz: f64,
 }
 
-/// A run's options with what `--real` stands for among them, for a machine: what is given stays.
-pub fn real_run(given: &RunOptions, machine: &Machine) -> RunOptions {
-    let parameters = &machine.folder.parameters;
-    let amplitude_v = real::RIPPLE_SHARE * parameters.dc_link_nominal_v;
-    let ripple = Ripple { amplitude_v, frequency_hz: real::RIPPLE_HZ };
-    RunOptions {
-        dead_time_us: or(given.dead_time_us, real::DEAD_TIME_US * shorter(machine)),
-        adc_bits: given.adc_bits.or(Some(real::ADC_BITS)),
-        noise_a: or(given.noise_a, real::NOISE_SHARE * parameters.max_current_a),
-        udc_ripple: given.udc_ripple.or(Some(ripple)),
-        rs_error: or(given.rs_error, real::RS_ERROR_PERCENT),
-        ..given.clone()
+impl RealInverter {
+    /// The two-level one that a machine is made for.
+    pub const fn of(machine: &Machine) -> Self {
+        let parameters = &machine.folder.parameters;
+        Self { link_v: parameters.dc_link_nominal_v, switching_hz: parameters.max_switching_hz }
+    }
+
+    /// By how much shorter times are where devices switch faster.
+    fn shorter(&self) -> f64 {
+        (real::SWITCHING_HZ / self.switching_hz).min(1.0)
+    }
+
+    /// A run's options with what `--real` stands for among them, for a machine: what is given stays.
+    pub fn run(&self, given: &RunOptions, machine: &Machine) -> RunOptions {
+        let ripple = Ripple { amplitude_v: real::RIPPLE_SHARE * self.link_v, frequency_hz: real::RIPPLE_HZ };
+        RunOptions {
+            dead_time_us: or(given.dead_time_us, real::DEAD_TIME_US * self.shorter()),
+            adc_bits: given.adc_bits.or(Some(real::ADC_BITS)),
+            noise_a: or(given.noise_a, real::NOISE_SHARE * machine.folder.parameters.max_current_a),
+            udc_ripple: given.udc_ripple.or(Some(ripple)),
+            rs_error: or(given.rs_error, real::RS_ERROR_PERCENT),
+            ..given.clone()
+        }
+    }
+
+    /// The drops of devices that `--real` stands for, for a machine.
+    pub fn drops(&self, machine: &Machine) -> Drops {
+        let volts = self.link_v / real::LINK_V;
+        let ohms = volts / (machine.folder.parameters.max_current_a / real::CURRENT_A);
+        let [igbt_v, igbt_mohm, diode_v, diode_mohm] = real::DROP;
+        Drops([igbt_v * volts, igbt_mohm * ohms, diode_v * volts, diode_mohm * ohms])
     }
 }
 
@@ -264,23 +285,15 @@ fn real_offset(machine: &Machine) -> Phases {
     Phases(real::OFFSET_PERCENT.map(|percent| percent * share))
 }
 
-/// The drops of devices that `--real` stands for, for a machine.
-pub fn real_drops(machine: &Machine) -> Drops {
-    let parameters = &machine.folder.parameters;
-    let volts = parameters.dc_link_nominal_v / real::LINK_V;
-    let ohms = volts / (parameters.max_current_a / real::CURRENT_A);
-    let [igbt_v, igbt_mohm, diode_v, diode_mohm] = real::DROP;
-    Drops([igbt_v * volts, igbt_mohm * ohms, diode_v * volts, diode_mohm * ohms])
-}
-
 impl Filled {
     /// Of options that ask for it, for a machine: what is given stays.
     pub fn of(given: &RunOptions, beside: Beside, flaws: &FlawOptions, machine: &Machine) -> Self {
-        let times = shorter(machine);
+        let inverter = RealInverter::of(machine);
+        let times = inverter.shorter();
         let [once_deg, twice_deg] = beside.angle_deg;
         let [shaft_hz, damping] = real::SHAFT;
         Self {
-            run: real_run(given, machine),
+            run: inverter.run(given, machine),
             beside: Beside {
                 udc_gain: or(beside.udc_gain, real::UDC_GAIN_PERCENT),
                 current_filter_us: or(beside.current_filter_us, real::FILTER_US * times),
@@ -292,7 +305,7 @@ impl Filled {
                 angle_jitter_us: or(flaws.angle_jitter_us, real::JITTER_US * times),
                 slots: or(flaws.slots, real::SLOTS_PERCENT),
                 magnets: or(flaws.magnets, real::MAGNETS_PERCENT),
-                device_drop: flaws.device_drop.or(Some(real_drops(machine))),
+                device_drop: flaws.device_drop.or(Some(inverter.drops(machine))),
                 adc_skew_us: flaws.adc_skew_us.or(Some(Times(real::SKEW_US.map(|us| us * times)))),
                 iron_loss: or(flaws.iron_loss, real::IRON_PERCENT),
                 shaft: flaws.shaft.or(Some(Elastic([shaft_hz / times, damping]))),
@@ -329,7 +342,7 @@ impl FlawOptions {
             ("--magnets", self.magnets, -90.0, 100.0),
         ])?;
         let drops = self.device_drop.unwrap_or_default();
-        drops.check(machine)?;
+        drops.check(parameters.dc_link_nominal_v, machine)?;
         if self.device_drop_known { drops.check_known() } else { Ok(()) }
     }
 

@@ -74,8 +74,8 @@ impl System for Traction {
         STEP_S
     }
 
-    fn min_pulse_us(machine: &Machine) -> f64 {
-        usual_min_pulse_us(machine.folder.parameters.max_switching_hz)
+    fn min_pulse_us(machine: &Machine) -> Option<f64> {
+        Some(usual_min_pulse_us(machine.folder.parameters.max_switching_hz))
     }
 
     fn check(options: &Options, scenario: &Map<String, Value>, machine: &Machine) -> Result<()> {

@@ -5,7 +5,7 @@ use super::{Controller, Line, Settings, TRACKING_RAD_S, bench};
 use crate::bench::Simulated;
 use crate::inject::zs9::Kind;
 use crate::options::RunOptions;
-use crate::run::{CLOCK, Interrupts, refused};
+use crate::run::{CLOCK, Interrupts};
 use crate::scenario::System;
 use crate::scenario::live::{ACKNOWLEDGE_S, Command, Start, TURN_S, Turning, Wanted};
 use crate::zs9::bench::Bench;
@@ -64,11 +64,12 @@ impl Live {
         let held = [(); 2].map(|()| SpeedSource::profile(vec![(0.0, start.speed_rpm)]));
         let plan = Plan {
             line: Some(line::TIMES),
+            judged_step_s: Some(start.step_s),
             ..Plan::driven((0.0, ROOM_S), held, [start.speed_rpm; 2], nothing)
         };
         let bench = bench(plan, &options, machine)?.endless();
         let drive = settings::drive(CLOCK, options.own.carrier_hz);
-        drive.check(machine.tables).map_err(refused)?;
+        settings::check(&drive, machine)?;
         let link_ref_v = options.own.uin;
         let ratings = drive.operator_ratings(&machine.tables.ratings);
         let request = Arc::new(Mutex::new(DualRequest::idle(&ratings, link_ref_v as f32)));

@@ -6,6 +6,7 @@ pub(super) mod load_step;
 mod patterns;
 mod prelude;
 pub(super) mod reverse;
+mod scaled;
 pub(super) mod steady;
 pub(super) mod timing;
 
@@ -14,7 +15,7 @@ pub use load_step::INERTIA_KG_M2;
 pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
 use super::System;
-use super::traction::flaws::{Drops, real_drops, real_run};
+use super::traction::flaws::{Drops, RealInverter};
 use crate::analysis::Figures;
 use crate::bench::Limits;
 use crate::inject::Injection;
@@ -25,7 +26,7 @@ use crate::options::{On, positive};
 use crate::plant::SpeedSource;
 use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
 use crate::report::Page;
-use crate::run::{CLOCK, Supervisor, on_host, refused};
+use crate::run::{CLOCK, Supervisor, on_host};
 use crate::verdict::{Verdict, bound};
 use crate::zs9::bench::{Bench, BenchSettings};
 use crate::zs9::line::LineTimes;
@@ -33,7 +34,7 @@ use crate::zs9::run::{Tasks, run_in_qemu};
 use crate::zs9::trace::Recording;
 use crate::zs9::{Operator, figures, settings};
 use anyhow::{Result, bail};
-use clap::Args;
+use clap::{Args, Command};
 use core::f64::consts::TAU;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -93,6 +94,8 @@ pub struct Plan {
     pub lead_s: f64,
     /// Length of the recording, in s.
     pub duration_s: f64,
+    /// Step of the rows that figures are taken from, in s, however densely the trace is written; `None`: a carrier period.
+    pub judged_step_s: Option<f64>,
     /// The rotors' drive.
     pub speeds: [SpeedSource; 2],
     /// Speeds of free rotors at the beginning, in r/min.
@@ -113,13 +116,22 @@ impl Plan {
         from_rpm: [f64; 2],
         operator: impl Operator + Send + 'static,
     ) -> Self {
-        Self { lead_s, duration_s, speeds, from_rpm, operator: Box::new(operator), edges: true, line: None }
+        Self {
+            lead_s,
+            duration_s,
+            judged_step_s: None,
+            speeds,
+            from_rpm,
+            operator: Box::new(operator),
+            edges: true,
+            line: None,
+        }
     }
 }
 
 impl System for Zs9 {
     const NAME: &'static str = "zs9";
-    const MACHINE: &'static str = "ipm-zs9";
+    const MACHINE: &'static str = scaled::MACHINE;
     type Own = Zs9Options;
     type Plan = Plan;
     type Recording = Recording;
@@ -132,7 +144,18 @@ impl System for Zs9 {
         f64::from(own.carrier_hz).recip()
     }
 
-    fn check(options: &Options, _scenario: &Map<String, Value>, machine: &Machine) -> Result<()> {
+    fn tailored(command: Command) -> Command {
+        let udc = format!("Voltage of the DC source, in V; default {SOURCE_V}");
+        command.mut_arg("udc", |arg| arg.help(udc)).mut_arg("min_pulse_us", |arg| arg.hide(true))
+    }
+
+    fn check(options: &Options, scenario: &Map<String, Value>, machine: &Machine) -> Result<()> {
+        if options.min_pulse_us.is_some() {
+            bail!("--min-pulse-us: the ZS9's scenarios do not have this option");
+        }
+        if let Some(step_nm) = scenario.get("step").and_then(Value::as_f64) {
+            scaled::check_step(step_nm, machine)?;
+        }
         let source_v = options.udc.unwrap_or(SOURCE_V);
         let link_ref_v = options.own.uin;
         if source_v > LARGEST_V {
@@ -141,7 +164,8 @@ impl System for Zs9 {
         if !(source_v..=LARGEST_V).contains(&link_ref_v) {
             bail!("--uin {link_ref_v}: must be from the source's {source_v} V to {LARGEST_V} V");
         }
-        options.own.device_drop.unwrap_or_default().check(machine)?;
+        let link_v = capacitor_v(options);
+        options.own.device_drop.unwrap_or_default().check(link_v, machine)?;
         options.check_flaws(machine, source_v)
     }
 
@@ -149,9 +173,11 @@ impl System for Zs9 {
         if !options.own.real {
             return options.clone();
         }
-        let device_drop = options.own.device_drop.or(Some(real_drops(machine)));
+        let inverter = RealInverter { link_v: capacitor_v(options), ..RealInverter::of(machine) };
+        let inverter = RealInverter { switching_hz: options.own.carrier_hz.into(), ..inverter };
+        let device_drop = options.own.device_drop.or(Some(inverter.drops(machine)));
         let own = Zs9Options { device_drop, ..options.own.clone() };
-        Options { run: real_run(&options.run, machine), own }
+        Options { run: inverter.run(&options.run, machine), own }
     }
 
     fn run(
@@ -166,10 +192,10 @@ impl System for Zs9 {
         let settings = settings::drive(CLOCK, options.own.carrier_hz);
         let told_us = if options.own.uncompensated { 0.0 } else { options.dead_time_us };
         let settings = settings::with_dead_time(settings, told_us * 1e-6);
+        settings::check(&settings, machine)?;
         let (on, law) = options.choice()?;
         match on {
             On::Host => {
-                settings.check(machine.tables).map_err(refused)?;
                 let ratings = settings.operator_ratings(&machine.tables.ratings);
                 let line = line.map(|times| {
                     Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
@@ -230,14 +256,15 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     let Plan { lead_s, duration_s, .. } = plan;
     let Zs9Options { carrier_hz, uin: link_ref_v, scheme, inject, .. } = options.own;
     if let Some(injection) = inject
-        && injection.at_s > duration_s
+        && !(0.0..=duration_s).contains(&injection.at_s)
     {
-        bail!("--inject at {} s: must be within the run, which ends at {duration_s} s", injection.at_s);
+        bail!("--inject at {} s: must be within the run, from 0 to {duration_s} s", injection.at_s);
     }
-    let trace_step_s = options.dt.unwrap_or(Zs9::trace_step_s(&options.own));
+    let judged_step_s = plan.judged_step_s.unwrap_or(Zs9::trace_step_s(&options.own));
+    let written_step_s = options.dt.unwrap_or(judged_step_s);
     let (shortest_s, longest_s) = (CLOCK.tick_s, duration_s);
-    if trace_step_s < f64::from(shortest_s) || trace_step_s > longest_s {
-        bail!("--dt {trace_step_s}: must be a number from {shortest_s} to {longest_s}");
+    if written_step_s < f64::from(shortest_s) || written_step_s > longest_s {
+        bail!("--dt {written_step_s}: must be a number from {shortest_s} to {longest_s}");
     }
     let source_v = options.udc.unwrap_or(SOURCE_V);
     let drops = options.own.device_drop.unwrap_or_default().devices();
@@ -253,7 +280,7 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
         carrier_ticks: settings::carrier_ticks(&CLOCK, carrier_hz),
         lead_s,
         duration_s,
-        trace_step_s,
+        trace_step_s: judged_step_s,
         link_ref_v,
         scheme,
         flaws: options.flaws(machine.folder.parameters.trip_current_a),
@@ -262,7 +289,13 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
         edges: plan.edges,
         dead_time_s: options.dead_time_us * 1e-6,
     };
-    Ok(Bench::new(plant, plan.operator, settings).with_line(plan.line))
+    let bench = Bench::new(plant, plan.operator, settings).with_line(plan.line);
+    Ok(if written_step_s == judged_step_s { bench } else { bench.writing_every(written_step_s) })
+}
+
+/// Voltage of the capacitors that is wanted, in V: of it are the link's pulses.
+fn capacitor_v(options: &Options) -> f64 {
+    0.5 * (options.own.uin + options.udc.unwrap_or(SOURCE_V))
 }
 
 /// Free rotors, loaded by what the operator says.
@@ -273,12 +306,14 @@ pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
 /// Link voltage from which figures are judged, in V: the lowest at which bounds are known. At less the link's own are farther off.
 pub const LEAST_JUDGED_V: f64 = 667.0;
 
-/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported.
+/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported; but
+/// one that never came, where nothing was injected, falls short of any bound.
 pub fn judge(figures: &Figures, options: &Options, bounds: &[(&str, &str, f64)]) -> Vec<Verdict> {
     let judged = options.own.uin >= LEAST_JUDGED_V && options.own.device_drop.is_none();
     let verdict = |(what, name, at_most): &(&str, &str, f64)| {
         let at_most = if judged { bound(options, *at_most, f64::INFINITY) } else { f64::INFINITY };
-        Verdict::at_most(what, figures.number(name), at_most)
+        let verdict = Verdict::at_most(what, figures.number(name), at_most);
+        if options.own.inject.is_some() { verdict } else { verdict.wanted() }
     };
     bounds.iter().map(verdict).collect()
 }

@@ -1,5 +1,6 @@
 //! The names that every scenario of the ZS9 is written with.
 
+pub use super::scaled::{LINK_OFF_PERCENT, known, scaled_kg_m2, scaled_nm, scaled_rpm};
 pub use super::{LEAST_JUDGED_V, Options, Plan, Zs9, Zs9Options, free, judge, rad_s, ramp};
 pub use crate::analysis::Figures;
 pub use crate::machine::Machine;
@@ -8,7 +9,7 @@ pub use crate::report::Page;
 pub use crate::rows::mean;
 pub use crate::scenario::Scenario;
 pub use crate::verdict::Verdict;
-pub use crate::zs9::figures::{self, Curve, INDUCTOR, SPEEDS, TORQUES, VOLTAGES, plot};
+pub use crate::zs9::figures::{self, Curve, DEMANDS, INDUCTOR, SPEEDS, TORQUES, VOLTAGES, plot};
 pub use crate::zs9::trace::{Recording, Row};
 pub use crate::zs9::{Orders, SeenMotors};
 pub use clap::Args;

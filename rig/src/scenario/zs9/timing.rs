@@ -7,7 +7,9 @@ use crate::law::LawName;
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Timing;
 
-/// The motors turn opposite ways: time in s, r/min. A quicker ramp would count as a lost angle.
+/// Largest speed of the paper's machine, in r/min.
+const MAX_RPM: f64 = 1_500.0;
+/// The motors turn opposite ways: time in s, r/min of the paper's machine. A quicker ramp would count as a lost angle.
 const PROFILE: [(f64, f64); 4] = [(0.0, 700.0), (0.01, 700.0), (0.11, 1450.0), (0.14, 1450.0)];
 const BRAKES_FROM_S: f64 = 0.125;
 const DURATION_S: f64 = 0.14;
@@ -31,13 +33,15 @@ fn off_percent(rows: &[Row]) -> f64 {
 }
 
 impl Scenario<Zs9> for Timing {
-    fn plan(&self, _options: &Options, _machine: &Machine) -> Plan {
-        let operator = |t_s: f64, _: SeenMotors| {
-            let towards = if t_s < BRAKES_FROM_S { FAR_RPM } else { -FAR_RPM };
+    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+        let share = machine.folder.parameters.max_speed_rpm / MAX_RPM;
+        let operator = move |t_s: f64, _: SeenMotors| {
+            let towards = if t_s < BRAKES_FROM_S { share * FAR_RPM } else { -share * FAR_RPM };
             let wanted = |rpm: f64| MotorDemand::Speed(rad_s(rpm) as f32);
             Orders { demands: [wanted(towards), wanted(-towards)], loads_nm: [0.0; 2], enable: true }
         };
         let turning = |way: f64| {
+            let way = share * way;
             let points = PROFILE.iter().map(|(t_s, rpm)| (LEAD_S + t_s, way * rpm));
             SpeedSource::profile(points.collect())
         };

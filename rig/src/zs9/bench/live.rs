@@ -13,16 +13,15 @@ use tractive::operator::DualStatus;
 impl Bench {
     /// The same without an end.
     pub fn endless(mut self) -> Self {
-        self.rows_wanted = usize::MAX;
+        self.rows.end_never();
         self
     }
 
     /// The rows and edges since the last time.
     pub fn take(&mut self) -> (Vec<Row>, Vec<Edge>) {
-        self.taken += self.rows.len();
         let edges = std::mem::take(&mut self.gates.edges);
         let seconds = |(at, gate, on)| Edge { t_s: self.time.seconds(at), gate, on };
-        (std::mem::take(&mut self.rows), edges.into_iter().map(seconds).collect())
+        (self.rows.take(), edges.into_iter().map(seconds).collect())
     }
 
     /// The operator's last word; `None` in the first slot.

@@ -12,7 +12,7 @@ mod record;
 mod run;
 mod sampling;
 mod settings;
-mod sums;
+mod spans;
 mod watch;
 
 pub use gates::as_diodes_have_it;
@@ -27,7 +27,7 @@ use crate::bench::{Conversions, Converter, Due, Observed, Tick, Timeline};
 use crate::inject::zs9::Spoiler;
 use crate::plant::zs9::{NetworkState, Zs9Plant};
 use gates::Gates;
-use sums::Sums;
+use spans::Spans;
 use tractive::drive::dual::COMPARE_STEPS;
 use tractive::operator::{DualStatus, Feedback};
 use tractive::ports::{DualDriveCommand, DualReport, DualSample, GateFeedback, PlayedPeriod};
@@ -49,7 +49,6 @@ pub struct Bench {
     nominal_source_v: f64,
     time: Timeline,
     course: Course,
-    rows_wanted: usize,
     /// Beginning of the carrier period that is played, and its length.
     begun: Tick,
     period: Tick,
@@ -68,19 +67,15 @@ pub struct Bench {
     feedback: GateFeedback,
     orders: Orders,
     control: Conversions<(DualSample, DualDriveCommand), DualReport>,
-    next_row: Tick,
-    sums: Sums,
-    /// Rows that were taken from the trace.
-    taken: usize,
-    /// The trace so far.
-    pub rows: Vec<Row>,
+    /// The rows that are judged, and the others that are written.
+    rows: Spans,
+    written: Option<Spans>,
 }
 
 impl Bench {
     /// A bench at its first instant, gates off.
     pub fn new(plant: Zs9Plant, mut operator: Box<dyn Operator + Send>, settings: BenchSettings) -> Self {
         let time = Timeline::new(settings.clock, COMPARE_STEPS, settings.lead_s);
-        let rows_wanted = (settings.duration_s / settings.trace_step_s).round() as usize;
         let speeds = plant.motors.each_ref().map(|motor| motor.speed_rpm());
         let fault_s = settings.injection.map(|injection| settings.lead_s + injection.at_s);
         Self {
@@ -91,7 +86,6 @@ impl Bench {
             converter: Converter::new(settings.flaws),
             spoiler: Spoiler::new(settings.injection),
             course: Course::default(),
-            rows_wanted,
             begun: 0,
             period: time.of_ticks(settings.carrier_ticks),
             next: Some(PlayedPeriod::off(settings.carrier_ticks / 2 * COMPARE_STEPS)),
@@ -105,10 +99,8 @@ impl Bench {
             observed: Observed::new(fault_s.map_or(Tick::MAX, |at_s| time.steps(at_s)), settings.limits),
             feedback: GateFeedback::default(),
             control: Conversions::new(&time),
-            next_row: time.lead,
-            sums: Sums::default(),
-            taken: 0,
-            rows: Vec::with_capacity(rows_wanted.min(1 << 20)),
+            rows: Spans::new(settings.trace_step_s, settings.duration_s, &time),
+            written: None,
             time,
             settings,
         }
@@ -128,11 +120,24 @@ impl Bench {
         let origin = origin_ticks * Tick::from(COMPARE_STEPS);
         self.time = self.time.beginning_at(origin);
         self.gates = self.gates.beginning_at(origin);
-        for step in [&mut self.begun, &mut self.control.next, &mut self.next_row] {
+        let written = self.written.as_mut().map(Spans::next_mut);
+        let regular = [&mut self.begun, &mut self.control.next, self.rows.next_mut()];
+        for step in regular.into_iter().chain(written) {
             *step += origin;
         }
         self.observed.from = self.observed.from.saturating_add(origin);
         self
+    }
+
+    /// The same with a trace that is written at a step of its own, in s, beside the one that is judged.
+    pub fn writing_every(mut self, step_s: f64) -> Self {
+        self.written = Some(Spans::new(step_s, self.settings.duration_s, &self.time));
+        self
+    }
+
+    /// The trace so far, at the step at which it is judged.
+    pub fn rows(&self) -> &[Row] {
+        self.rows.as_slice()
     }
 
     /// The same with a source and schemes that change.

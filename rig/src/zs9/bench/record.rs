@@ -1,8 +1,9 @@
 //! The trace.
 
 use super::Bench;
+use super::spans::{Seen, Spans};
 use crate::bench::{Simulated, Tick, Timeline};
-use crate::zs9::trace::{Edge, MotorRow, Recording, Row};
+use crate::zs9::trace::{Edge, Recording};
 use tractive::recorder::DualRecord;
 use tractive::time::Instant;
 
@@ -15,7 +16,7 @@ impl Simulated for Bench {
     }
 
     fn is_done(&self) -> bool {
-        self.rows.len() >= self.rows_wanted
+        self.rows.are_all() && self.written.as_ref().is_none_or(Spans::are_all)
     }
 
     fn progress(&self) -> f64 {
@@ -33,7 +34,9 @@ impl Simulated for Bench {
 
     fn end_at(&mut self, instant: Instant) {
         let end_s = self.instant_s(instant);
-        self.rows_wanted = self.rows_wanted.min((end_s / self.settings.trace_step_s).round() as usize);
+        for spans in [Some(&mut self.rows), self.written.as_mut()].into_iter().flatten() {
+            spans.end_at(end_s);
+        }
     }
 
     fn into_recording(self, records: Vec<DualRecord>) -> Recording {
@@ -44,50 +47,31 @@ impl Simulated for Bench {
         let edge =
             |(at, gate, on): &(Tick, u8, bool)| Edge { t_s: self.time.seconds(*at), gate: *gate, on: *on };
         let edges = self.gates.edges.iter().map(edge).collect();
-        Recording { rows: self.rows, keeps_edges: self.settings.edges, edges, recorded }
+        let written = self.written.map(Spans::into_vec);
+        Recording { rows: self.rows.into_vec(), written, keeps_edges: self.settings.edges, edges, recorded }
     }
 }
 
 impl Bench {
-    /// Ends the row that ends now, if one has begun.
+    /// The time at which the next row ends.
+    pub(super) fn next_row(&self) -> Tick {
+        let written = self.written.as_ref().map_or(Tick::MAX, Spans::next);
+        self.rows.next().min(written)
+    }
+
+    /// Ends the rows that end now, if they have begun.
     pub(super) fn record(&mut self) {
-        let sums = std::mem::take(&mut self.sums);
-        let means = self.plant.take_means();
-        if self.time.now > self.time.lead
-            && !self.is_done()
-            && let Some(means) = means
-        {
-            let motors = [0, 1].map(|k| {
-                let motor = &means.motors[k];
-                MotorRow {
-                    speed_rpm: motor.speed_rpm,
-                    torque_ref_nm: sums.torque_refs[k] / sums.steps,
-                    torque_nm: motor.torque_nm,
-                    id_a: motor.id_a,
-                    iq_a: motor.iq_a,
-                    phases_a: motor.phases_a,
-                    load_nm: sums.loads[k] / sums.steps,
-                    voltage_v: self.control.report.voltage_v[k].into(),
-                    weakening: self.control.report.weakening[k],
-                }
-            });
-            self.rows.push(Row {
-                t_s: (self.taken + self.rows.len()) as f64 * self.settings.trace_step_s,
-                motors,
-                link_v: means.link_v,
-                capacitor_v: means.capacitor_v,
-                inductor_a: means.inductor_a,
-                source_v: sums.source_v / sums.steps,
-                duty: sums.shorted / sums.steps,
-                scheme: self.control.report.scheme,
-                trip: self.control.report.trip,
-                source_j: self.plant.energies.source_j,
-                kinetic_speed_rpm: self.speeds_rpm(),
-                explained_j: self.plant.energies.source_j - self.plant.residual_j(0.0),
-            });
+        let sums = self.plant.take_sums();
+        let seen = Seen {
+            source_v: self.plant.source_v,
+            source_j: self.plant.energies.source_j,
+            explained_j: self.plant.energies.source_j - self.plant.residual_j(0.0),
+            speeds_rpm: self.speeds_rpm(),
+            report: self.control.report,
+        };
+        for spans in [Some(&mut self.rows), self.written.as_mut()].into_iter().flatten() {
+            spans.record(&sums, &seen, &self.time);
         }
-        let end_s = (self.taken + self.rows.len() + 1) as f64 * self.settings.trace_step_s;
-        self.next_row = self.time.row_end(end_s);
         self.control.show(self.time.now);
     }
 }

@@ -27,7 +27,7 @@ impl Bench {
             let line = line.map(|tick| self.time.of_ticks(tick).max(now + 1));
             let load = self.loads.next().map(|at| at.max(now + 1));
             let events = [fault, toggle, off, line, load, self.gates.next_event()];
-            let regular = [self.begun + self.period, self.control.next, self.next_row];
+            let regular = [self.begun + self.period, self.control.next, self.next_row()];
             let due = events.into_iter().flatten().chain(regular).fold(to, Tick::min);
             self.integrate(due)?;
             self.act()?;
@@ -81,15 +81,10 @@ impl Bench {
             let latch = if on { &mut self.feedback.on } else { &mut self.feedback.off };
             *latch |= 1 << gate;
         }
-        let sums = &mut self.sums;
-        sums.steps += steps;
-        sums.source_v += steps * self.plant.source_v;
-        for k in 0..2 {
-            sums.torque_refs[k] += steps * f64::from(self.control.report.torque_nm[k]);
-            sums.loads[k] += steps * self.orders.loads_nm[k];
-        }
-        if gates.contains(&LegGates::SHOOT_THROUGH) {
-            sums.shorted += steps;
+        let shorted = gates.contains(&LegGates::SHOOT_THROUGH);
+        for spans in [Some(&mut self.rows), self.written.as_mut()].into_iter().flatten() {
+            let torques_nm = (self.control.report.torque_nm, self.orders.loads_nm);
+            spans.pass(steps, self.plant.source_v, torques_nm, shorted);
         }
         self.time.now = to;
         self.watch();
@@ -131,7 +126,7 @@ impl Bench {
             self.begun = self.time.now;
             self.begin_period()?;
         }
-        if self.time.now == self.next_row {
+        if self.time.now == self.next_row() {
             self.record();
         }
         if self.time.now == self.control.next {

@@ -1,0 +1,139 @@
+//! The rows of the trace at one step, and the sums over the one that has begun.
+
+use crate::bench::{Rows, Tick, Timeline};
+use crate::plant::zs9::{Adder, MotorMeans};
+use crate::zs9::trace::{MotorRow, Row};
+use tractive::ports::DualReport;
+
+/// The sums over a row, each value times its time, in steps.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    steps: f64,
+    torque_refs: [f64; 2],
+    loads: [f64; 2],
+    source_v: f64,
+    shorted: f64,
+}
+
+/// The plant at the instant where a row ends, and control's report until then.
+pub struct Seen {
+    pub source_v: f64,
+    pub source_j: f64,
+    pub explained_j: f64,
+    pub speeds_rpm: [f64; 2],
+    pub report: DualReport,
+}
+
+/// The rows at one step.
+pub struct Spans {
+    rows: Rows<Row>,
+    /// Rows until the end.
+    wanted: u64,
+    sums: Sums,
+    plant: Adder,
+}
+
+impl Spans {
+    /// None yet, from the recording's beginning on, for so long, in s.
+    pub fn new(step_s: f64, duration_s: f64, time: &Timeline) -> Self {
+        let rows = Rows::new(step_s, duration_s, time);
+        Self { wanted: rows.until(duration_s), rows, sums: Sums::default(), plant: Adder::default() }
+    }
+
+    /// The time at which the next one ends.
+    pub const fn next(&self) -> Tick {
+        self.rows.next
+    }
+
+    /// The same, to be changed.
+    pub const fn next_mut(&mut self) -> &mut Tick {
+        &mut self.rows.next
+    }
+
+    /// The recording ends at a time, in s, if it does not end before.
+    pub fn end_at(&mut self, end_s: f64) {
+        self.wanted = self.wanted.min(self.rows.until(end_s));
+    }
+
+    /// The recording has no end.
+    pub const fn end_never(&mut self) {
+        self.wanted = u64::MAX;
+    }
+
+    /// `true` if the last one has ended.
+    pub fn are_all(&self) -> bool {
+        self.rows.has(self.wanted)
+    }
+
+    /// So many steps pass with this source, these torque references and loads, and a link that is shorted or is not.
+    pub fn pass(
+        &mut self,
+        steps: f64,
+        source_v: f64,
+        (refs_nm, loads_nm): ([f32; 2], [f64; 2]),
+        shorted: bool,
+    ) {
+        let sums = &mut self.sums;
+        sums.steps += steps;
+        sums.source_v += steps * source_v;
+        for k in 0..2 {
+            sums.torque_refs[k] += steps * f64::from(refs_nm[k]);
+            sums.loads[k] += steps * loads_nm[k];
+        }
+        if shorted {
+            sums.shorted += steps;
+        }
+    }
+
+    /// The plant's sums since a row of any step ended; the one that ends now is kept, if it has begun.
+    pub fn record(&mut self, plant: &Adder, seen: &Seen, time: &Timeline) {
+        self.plant.append(plant);
+        if self.next() != time.now {
+            return;
+        }
+        let (sums, plant) = (std::mem::take(&mut self.sums), std::mem::take(&mut self.plant));
+        let wanted = time.now > time.lead && !self.are_all();
+        let means = plant.means(seen.source_v).filter(|_| wanted);
+        let motor = |k: usize, means: &MotorMeans| MotorRow {
+            speed_rpm: means.speed_rpm,
+            torque_ref_nm: sums.torque_refs[k] / sums.steps,
+            torque_nm: means.torque_nm,
+            id_a: means.id_a,
+            iq_a: means.iq_a,
+            phases_a: means.phases_a,
+            load_nm: sums.loads[k] / sums.steps,
+            voltage_v: seen.report.voltage_v[k].into(),
+            weakening: seen.report.weakening[k],
+        };
+        let row = means.map(|means| Row {
+            t_s: self.rows.begun_s(),
+            motors: [0, 1].map(|k| motor(k, &means.motors[k])),
+            link_v: means.link_v,
+            capacitor_v: means.capacitor_v,
+            inductor_a: means.inductor_a,
+            source_v: sums.source_v / sums.steps,
+            duty: sums.shorted / sums.steps,
+            scheme: seen.report.scheme,
+            trip: seen.report.trip,
+            source_j: seen.source_j,
+            kinetic_speed_rpm: seen.speeds_rpm,
+            explained_j: seen.explained_j,
+        });
+        self.rows.push(row, time);
+    }
+
+    /// Takes those there are.
+    pub fn take(&mut self) -> Vec<Row> {
+        self.rows.take()
+    }
+
+    /// Those there are.
+    pub fn as_slice(&self) -> &[Row] {
+        self.rows.as_slice()
+    }
+
+    /// All of them.
+    pub fn into_vec(self) -> Vec<Row> {
+        self.rows.into_vec()
+    }
+}
