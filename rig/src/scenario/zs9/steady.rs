@@ -89,11 +89,14 @@ const BOUNDS: [(Scheme, [f64; 3]); 4] = [
     (Scheme::Zvo, [2.14, 1.65, 10.15]),
 ];
 
-/// The mean torque's: what a scheme leaves undone with flaws is told, that the motor drives at all is judged.
+/// With flaws the mean torque may be off by so much, in %.
+const FLAWED_PERCENT: f64 = 2.0;
+
+/// The mean torque's.
 fn torque_verdicts(off_percent: [f64; 2], options: &Options, machine: &Machine) -> [Verdict; 2] {
     let Zs9Options { device_drop, uncompensated, .. } = options.own;
-    let ideal = if device_drop.is_some() { 10.0 } else { known(machine, 0.1, 0.5) };
-    let at_most = if uncompensated { f64::INFINITY } else { torque_bound(options, ideal, 10.0) };
+    let ideal = if device_drop.is_some() { FLAWED_PERCENT } else { known(machine, 0.1, 0.5) };
+    let at_most = if uncompensated { f64::INFINITY } else { torque_bound(options, ideal, FLAWED_PERCENT) };
     let of = ["upper", "lower"].map(|motor| format!("mean torque of the {motor} motor off in %"));
     [0, 1].map(|k| Verdict::at_most(&of[k], off_percent[k], at_most))
 }
