@@ -313,7 +313,7 @@ impl StartUp {
                 if self.against { share } else { -share }
             }
             _ if passed_s > REST_S => {
-                self.drift = moved.signed() / self.commands as i32;
+                self.drift = (moved.signed() as f32 / self.commands as f32) as i32;
                 self.begin(Stage::Push);
                 0.0
             }
@@ -330,12 +330,6 @@ impl StartUp {
     /// Found, with d along the axis or against it.
     fn found(&self, against: bool) -> StartUpStep {
         StartUpStep::Found(Angle((self.axis - self.from).0 ^ u32::from(against) << 31))
-    }
-}
-
-impl Default for StartUp {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -1,10 +1,8 @@
 //! The torque of the ZS9's motors is the one that is asked for, whatever resistance, devices and dead time take of their voltage.
 
-mod zs9_runs;
-
 use rayon::prelude::*;
+use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recorded;
-use zs9_runs::run;
 
 /// Bins of the speed, in r/min: from the first to the last, and how wide.
 const FROM_RPM: f64 = 50.0;
@@ -23,7 +21,8 @@ fn torque_is_the_demand_from_standstill_on() {
         "--rs-error 50 --dead-time-us 3 --carrier-hz 20000",
     ];
     flaws.into_par_iter().for_each(|flaws| {
-        let recording = run(&format!("zs9-cycle --cruise 1 {flaws}")).recording;
+        let chosen = catalogue::of_zs9(&format!("zs9-cycle --cruise 1 {flaws}")).unwrap();
+        let recording = chosen.drive(&chosen.machine().unwrap()).unwrap();
         assert!(recording.trip().is_none(), "{flaws}: {:?}", recording.trip());
         for motor in 0..2 {
             let mut bins = [(0.0, 0.0); ((UNTIL_RPM - FROM_RPM) / WIDE_RPM) as usize];

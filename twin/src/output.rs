@@ -67,6 +67,7 @@ fn recording(world: &mut World) -> Happened {
                 keeps_edges: true,
                 edges: edges.iter().map(edge).collect(),
                 recorded: Vec::new(),
+                written: None,
             })
         }
     }

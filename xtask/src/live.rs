@@ -84,12 +84,12 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
 /// The rig's words for the host's sweep; `OUT` is its folder.
 const SWEEP: &str = "run sweep --on host --out OUT";
 
-/// Commands whose pages are looked at besides the sweep's, with their exit codes: pictures of a paper, the other system, as many rows of it as a run has, a
+/// Commands whose pages are looked at besides the sweep's, with their exit codes: pictures of a paper, the other system, its longest run, a
 /// drive that trips, one that is commanded over its protocol, a machine.
 const REPORTS: [(&str, &str, i32); 6] = [
     ("characteristic", "run characteristic --on host --out OUT", 0),
     ("zs9-load-step", "run zs9-load-step --on host --out OUT", 0),
-    ("many-rows", "run zs9-steady --on host --out OUT", 0),
+    ("zs9-cycle", "run zs9-cycle --on host --out OUT", 0),
     ("trip", "run sweep --to 100 --udc 2200 --on host --out OUT", 1),
     ("talk", "talk rig/scripts/round-trip.talk --on host --out OUT", 0),
     ("machine", "machine show pmasynrm-180kw --out OUT/report.html", 0),
