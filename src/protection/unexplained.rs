@@ -33,7 +33,7 @@ impl UnexplainedWatch {
     }
 
     /// A boundary has passed after a half of so many seconds, with a voltage that is left unexplained, in V, rotor frame, of which a dead time that is told may
-    /// take so much, at an electrical speed in rad/s.
+    /// take so many, in V, from 0, at an electrical speed in rad/s.
     #[inline(always)]
     pub fn step(&mut self, unexplained_v: Dq, dead_v: f32, omega: f32, half_s: f32, tables: &Tables) {
         let ratings = &tables.ratings;

@@ -19,7 +19,7 @@ pub enum Step {
     Loom,
     /// The lock-free cells in the interpreter that knows undefined behaviour
     Miri,
-    /// Every target of fuzz/ for a minute, guided by what it reaches
+    /// Every target of fuzz/ for a minute or two million inputs, guided by what it reaches
     Fuzz,
     /// A sample of mutants of the code: tests notice enough of them
     Mutants,

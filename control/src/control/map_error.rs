@@ -37,6 +37,8 @@ const LINK_NOISE: f32 = 3e-3;
 const EMF_NOISE: f32 = 4e-3;
 /// EMF over what the dead time may take from which it tells of the flux linkage.
 const TELLING: f32 = 6.0;
+/// Part of what the dead time may take where the signs of all currents are known, in legs of two gates.
+const LEFT_SHARE: f32 = 0.2;
 /// Part of what the dead time takes that says nothing.
 const UNSAID: f32 = 0.25;
 /// Standard deviations of a voltage that is learnt from: an inverter or a link with a fault has more, and is no error of the machine.
@@ -143,7 +145,7 @@ pub struct Half {
 pub struct DeadTime {
     /// Voltage that it takes of a phase where nobody knows the sign of its current, in V.
     pub voltage_v: f32,
-    /// Part of that which is left where the signs of all currents are known.
+    /// Part of that which is left where the signs of all currents are known and the pulses make up for it, 0 ..= 1.
     pub left_share: f32,
     /// By how much an edge comes late where nobody makes up for it, in s.
     pub time_s: f32,
@@ -155,7 +157,7 @@ impl DeadTime {
     pub fn of(ticks: u32, carrier_ticks: u32, link_v: f32, clock: &Clock) -> Self {
         let (ticks, carrier_ticks) = (ticks as f32, carrier_ticks as f32);
         let voltage_v = link_v * ticks / carrier_ticks;
-        Self { voltage_v, left_share: 0.2, time_s: ticks / clock.ticks_per_s }
+        Self { voltage_v, left_share: LEFT_SHARE, time_s: ticks / clock.ticks_per_s }
     }
 }
 
