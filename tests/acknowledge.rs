@@ -347,7 +347,7 @@ fn the_traction_drive_forgets_no_fault() {
 fn the_zs9_forgets_no_fault() {
     // The peaks keep their distance from the valleys; two carriers a control period are another order.
     for carrier_ticks in [2_500, 1_250] {
-        let settings = dual::Settings::new(CLOCK, carrier_ticks);
+        let settings = dual::Settings::new(CLOCK, carrier_ticks, &zs9::BUILT_IN);
         Case::each(1, |case| {
             let shared = dual::Shared::new();
             let mut control = dual::ControlTask::new(&zs9::BUILT_IN, settings);

@@ -18,7 +18,7 @@ fn settings() -> traction::Settings {
 }
 
 fn zs9_settings() -> dual::Settings {
-    dual::Settings::new(CLOCK, 2_500)
+    dual::Settings::new(CLOCK, 2_500, &zs9::BUILT_IN)
 }
 
 /// A scalar by its name, and the way to it.
@@ -110,7 +110,7 @@ fn try_tables(good: &'static Tables, check: impl Fn(&Tables) -> Result<(), Refus
     let iron = fields!(IronLoss as IronLoss { hysteresis, eddy | }: f32);
     try_all(*good, "ratings.iron.", iron, |tables| &mut tables.ratings.iron, check);
     #[allow(dead_code, reason = "for the compiler to see that no table is left out")]
-    fn is_whole(Tables { name: _, ratings: _, flux: _, mtpa, weakening }: Tables) {
+    fn is_whole(Tables { name: _, ratings: _, flux: _, mtpa, weakening, z_source: _ }: Tables) {
         let Mtpa { universal: _, parameters: _, start: _, curvature: _ } = mtpa;
         let Weakening { currents: _, torque: _, flux_knee_wb: _, share_knee: _ } = weakening;
     }
@@ -236,7 +236,7 @@ fn every_scalar_of_the_zs9() {
 }
 
 fn zs9_settings_of(carrier_ticks: u32) -> dual::Settings {
-    dual::Settings::new(CLOCK, carrier_ticks)
+    dual::Settings::new(CLOCK, carrier_ticks, &zs9::BUILT_IN)
 }
 
 /// The only loop of an interrupt whose length is configured runs over these, and they are divided by.

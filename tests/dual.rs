@@ -25,7 +25,7 @@ use tractive::time::{Clock, Instant};
 
 const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 const CARRIER_TICKS: u32 = 2_500;
-const SETTINGS: Settings = Settings::new(CLOCK, CARRIER_TICKS);
+const SETTINGS: Settings = Settings::new(CLOCK, CARRIER_TICKS, &BUILT_IN);
 /// Electrical, in rad/s: 600 r/min.
 const OMEGA: f32 = 251.3;
 

@@ -160,7 +160,7 @@ impl PwmPort<Dual> for Board {
 
 /// A walk: a line each 200 periods.
 fn walk(carrier_ticks: u32, dead_time_ticks: u32, seed: u64, out: &mut String) {
-    let usual = Settings::new(CLOCK, 2_500);
+    let usual = Settings::new(CLOCK, 2_500, &BUILT_IN);
     // The currents of a walk do not follow its voltage.
     let unexplained = MaskedFaults::of(Fault::VoltageUnexplained);
     let mut control = ControlTask::new(&BUILT_IN, usual).without(unexplained);

@@ -249,7 +249,7 @@ fn traction(injected: InjectedFault) -> (Option<Trip>, Option<u32>, u32) {
 
 /// The same of the ZS9, with a carrier period in ticks.
 fn zs9(injected: InjectedFault, carrier_ticks: u32) -> (Option<Trip>, Option<u32>) {
-    let settings = dual::Settings::new(CLOCK, carrier_ticks);
+    let settings = dual::Settings::new(CLOCK, carrier_ticks, &zs9::BUILT_IN);
     let shared = dual::Shared::new();
     // What the gates and the currents do is not played here.
     let [stuck, unexplained] = [Fault::LegStuck, Fault::VoltageUnexplained].map(MaskedFaults::of);

@@ -367,7 +367,7 @@ fn check_period(played: &PlayedPeriod, half: u32, duty: f32) {
 
 /// The ZS9's interrupts, with a carrier of so many ticks.
 pub fn check_zs9(omega: f32, carrier_ticks: u32, calls: &[Call]) {
-    let settings = dual::Settings::new(CLOCK, carrier_ticks);
+    let settings = dual::Settings::new(CLOCK, carrier_ticks, &zs9::BUILT_IN);
     let half = settings.half_steps();
     let shared = dual::Shared::new();
     let mut control = dual::ControlTask::new(&zs9::BUILT_IN, settings);

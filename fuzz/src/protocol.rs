@@ -250,9 +250,9 @@ pub fn check_session(events: &[Event]) {
 
 /// The ZS9 asks for nothing that is no number, and for nothing once no frame has been taken for long.
 pub fn check_zs9(events: &[Event]) {
-    let settings = tractive::drive::dual::Settings::new(tractive::time::Clock::new(25_000_000, 2_500), 2_500);
     static RATINGS: std::sync::OnceLock<Ratings> = std::sync::OnceLock::new();
-    let ratings = RATINGS.get_or_init(|| settings.operator_ratings(&zs9::BUILT_IN.ratings));
+    let ratings =
+        RATINGS.get_or_init(|| tractive::drive::dual::Settings::operator_ratings(&zs9::BUILT_IN.ratings));
     let (mut bus, mut session) = (Bus::of_zs9(), Zs9Session::new(ratings));
     let (mut age_ms, mut received) = (u32::MAX, 0);
     for event in events {

@@ -9,7 +9,7 @@ use tractive::ports::MotorDemand;
 use tractive_rig::campaign::dual::{Cause, faults};
 use tractive_rig::machine::Machine;
 use tractive_rig::scenario::live::{Command, Start, Turning, Wanted};
-use tractive_rig::scenario::zs9::{Live, Options};
+use tractive_rig::scenario::zs9::{Live, Options, link_v};
 use tractive_rig::zs9::bound::{Stretch, currents};
 use tractive_rig::zs9::trace::{Edge, Row};
 
@@ -84,7 +84,7 @@ impl Zs9 {
             carrier_hz: options.own.carrier_hz.into(),
             step_s: start.step_s,
             kept: Vec::new(),
-            link_ref_v: options.own.uin,
+            link_ref_v: link_v(options, machine),
             scheme: options.own.scheme,
             gates: [false; 9],
         })

@@ -196,7 +196,7 @@ fn help_shows_what_the_scenario_takes() {
     assert!(!sweep.contains("--step") && !sweep.contains("--scheme"), "{sweep}");
     let zs9 = help("run zs9-load-step -h");
     assert!(zs9.contains("--step") && zs9.contains("--scheme") && !zs9.contains("--down"), "{zs9}");
-    assert!(zs9.contains("default 400") && !zs9.contains("--min-pulse-us"), "{zs9}");
+    assert!(zs9.contains("the paper's 400") && !zs9.contains("--min-pulse-us"), "{zs9}");
     let all = help("run --help");
     assert!(all.contains("zs9-cycle") && all.contains("--dead-time-us") && !all.contains("--down"), "{all}");
 }

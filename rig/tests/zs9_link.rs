@@ -9,8 +9,10 @@ use tractive_rig::plant::zs9::{LegGates, NetworkState, Source, ZNetwork, Zs9Plan
 use zs9::{PERIOD_S, SOURCE_V, period, plant_at, regulated};
 
 /// By itself, and the drive's own, which is quicker: the motors' power is fed forward.
-const DESIGNS: [ZSourceDesign; 2] =
-    [ZSourceDesign::ZS9, Settings::new(Clock::new(25_000_000, 2_500), 2_500).link];
+const DESIGNS: [ZSourceDesign; 2] = [
+    ZSourceDesign::ZS9,
+    Settings::new(Clock::new(25_000_000, 2_500), 2_500, &tractive::built_in::zs9::BUILT_IN).link,
+];
 const LINK_V: f64 = 2000.0 / 3.0;
 
 /// The control; its duty acts in the period after the one that begins with the sample.

@@ -4,11 +4,12 @@ use crate::control::{SpeedDesign, SpeedTracker, ZSourceDesign, ZSourceGains};
 use crate::drive::{dual, traction};
 use crate::machine::{Ratings, Tables};
 use crate::protection::{INNOVATION_RAD, LinkLimits};
+use crate::time::Clock;
 use tractive_control::checked;
 use tractive_control::configuration::{ABOVE_ZERO, Bound, ROUNDING, Refused, within};
 
-/// Largest torque that a speed error of 1 rad/s may ask for, as a multiple of the largest.
-const STIFFEST: f32 = 10.0;
+/// Highest voltage of the capacitors over the source's: at a shoot-through duty of a quarter.
+const HIGHEST_SHARE: f32 = 1.5;
 /// Carrier periods in a control period.
 const MOST_CARRIERS: f32 = 8.0;
 /// The longest carrier period, in ticks: sixteen bits hold a half of it in compare steps.
@@ -33,9 +34,7 @@ impl traction::Settings {
     pub const fn check(&self, tables: &Tables) -> Result<(), Refused> {
         checked!(tables.check());
         checked!(self.check_settings());
-        let most = SpeedTracker::most_acceleration_rad_s2(LARGEST_LAG_RAD, self.clock.control_s());
-        let fastest = tables.ratings.max_acceleration_rad_s2;
-        within(&[Bound("ratings.max_acceleration_rad_s2", fastest, ABOVE_ZERO, most)])
+        check_acceleration(&tables.ratings, &self.clock)
     }
 
     /// The same for a machine that is checked already.
@@ -85,9 +84,12 @@ impl dual::Settings {
         checked!(self.check_carrier());
         checked!(gains.check());
         checked!(check_speed(speed, clock.control_s(), &tables.ratings));
-        let fastest = tables.ratings.max_acceleration_rad_s2;
-        let most = dual::MOST_ACCELERATION_RAD_S2;
-        checked!(within(&[Bound("ratings.max_acceleration_rad_s2", fastest, ABOVE_ZERO, most)]));
+        checked!(check_acceleration(&tables.ratings, clock));
+        // What shoot-through makes of the source, and room to regulate; ratings are rounded.
+        let most_v = 1.01 * HIGHEST_SHARE * tables.z_source.source_v * dual::TWO_LEVEL_SHARE;
+        checked!(within(
+            &[Bound("ratings.dc_link_max_v", tables.ratings.dc_link_max_v, ABOVE_ZERO, most_v),]
+        ));
         checked!(check_link(link, clock.control_s()));
         checked!(check_link_gains(link_gains, link));
         check_limits(limits)
@@ -112,11 +114,17 @@ impl dual::Settings {
     }
 }
 
+/// An acceleration that the tracked angle can follow.
+const fn check_acceleration(ratings: &Ratings, clock: &Clock) -> Result<(), Refused> {
+    let most = SpeedTracker::most_acceleration_rad_s2(LARGEST_LAG_RAD, clock.control_s());
+    within(&[Bound("ratings.max_acceleration_rad_s2", ratings.max_acceleration_rad_s2, ABOVE_ZERO, most)])
+}
+
 const fn check_speed(speed: &SpeedDesign, control_s: f32, ratings: &Ratings) -> Result<(), Refused> {
     let SpeedDesign { inertia_kg_m2, natural_rad_s, period_s } = *speed;
     // The loop runs where its motor has a new operating point.
     let turns_s = dual::TURNS as f32 * control_s;
-    let most_nm = STIFFEST * ratings.max_torque_nm;
+    let most_nm = (1.0 + ROUNDING) * SpeedDesign::STIFFEST * ratings.max_torque_nm;
     within(&[
         Bound("speed.period_s", period_s, (1.0 - ROUNDING) * turns_s, (1.0 + ROUNDING) * turns_s),
         Bound("speed.natural_rad_s", natural_rad_s, ABOVE_ZERO, 0.5 / turns_s),

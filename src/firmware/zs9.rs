@@ -13,16 +13,17 @@ use tractive::protocol::Zs9CanEndpoint;
 
 static SHARED: Shared = Shared::recorded_by(&qemu::DUAL_RECORDER);
 /// Until the host has told its carrier and its dead time.
-const DEFAULTS: Settings = Settings::new(CLOCK, CLOCK.control_ticks);
+const DEFAULTS: Settings = Settings::new(CLOCK, CLOCK.control_ticks, &BUILT_IN);
 /// As the operator looks at them.
-static RATINGS: Ratings = DEFAULTS.operator_ratings(&BUILT_IN.ratings);
+static RATINGS: Ratings = Settings::operator_ratings(&BUILT_IN.ratings);
 static CARRIER_TICKS: AtomicU32 = AtomicU32::new(0);
 static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
 
 fn settings() -> Settings {
     Settings {
+        carrier_ticks: CARRIER_TICKS.load(Ordering::Relaxed),
         dead_time_ticks: DEAD_TIME_TICKS.load(Ordering::Relaxed),
-        ..Settings::new(CLOCK, CARRIER_TICKS.load(Ordering::Relaxed))
+        ..DEFAULTS
     }
 }
 

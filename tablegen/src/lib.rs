@@ -39,7 +39,7 @@ pub use input::read_bounded;
 pub use iron::Iron;
 pub use map::{FluxMap, line_of};
 pub use optimum::Optimum;
-pub use parameters::{Parameters, Patterns};
+pub use parameters::{Parameters, Patterns, TWO_LEVEL_SHARE};
 pub use rust_source::rust_source;
 pub use smooth::{FluxPoint, SmoothMap};
 

@@ -98,6 +98,16 @@ parameters! {
         loss_quadratic_fraction: 0.0..=1.0, 0.6;
         /// Share of that loss that is known to be the iron's, which the drive makes up for in its torque, 0 ..= 1; default 0.
         iron_loss_share: 0.0..=1.0, 0.0;
+        /// Voltage of a nine-switch inverter's source, in V; default that of `dc_link_min_v`.
+        zs9_source_v: ABOVE_ZERO..=1e5, dc_link_min_v / TWO_LEVEL_SHARE;
+        /// Voltage of its link outside shoot-through until somebody asks for another, in V; default that of `dc_link_nominal_v`.
+        zs9_link_v: ABOVE_ZERO..=1e5, 2.0 * dc_link_nominal_v / TWO_LEVEL_SHARE - zs9_source_v;
+        /// Inductance of each inductor of its network, in H; default as much for both motors' `max_power_w` at the source's voltage as the paper's.
+        zs9_inductance_h: ABOVE_ZERO..=10.0, 78.6e-6 * zs9_source_v * zs9_source_v / (2.0 * max_power_w);
+        /// Resistance of each, in ohm; default 20 Ω a henry.
+        zs9_resistance_ohm: 0.0..=1e3, 20.0 * zs9_inductance_h;
+        /// Capacitance of each capacitor of its network, in F; default as `zs9_inductance_h`.
+        zs9_capacitance_f: ABOVE_ZERO..=100.0, 3.18e-3 * 2.0 * max_power_w / (zs9_source_v * zs9_source_v);
     }
 }
 
@@ -144,6 +154,11 @@ impl Parameters {
         Ok(parameters)
     }
 
+    /// `true` if the file has this key.
+    pub fn names(&self, key: &str) -> bool {
+        self.line_of(key).is_some()
+    }
+
     /// The line of a key, if the file has it.
     pub(crate) fn line_of(&self, key: &str) -> Option<u64> {
         self.lines.get(key).copied()
@@ -178,7 +193,7 @@ impl Parameters {
     }
 
     /// The order of limits: a trip level lies beyond its limit.
-    fn limits(&self) -> [Order; 8] {
+    fn limits(&self) -> [Order; 9] {
         let at_most = |low, high| Order { low, high, may_be_equal: true };
         let below = |low, high| Order { low, high, may_be_equal: false };
         let least = ("dc_link_min_v", self.dc_link_min_v);
@@ -194,6 +209,7 @@ impl Parameters {
             below(("trip_dc_under_v", self.trip_dc_under_v), least),
             below(("max_current_a", current_a), ("trip_current_a", self.trip_current_a)),
             below(("max_speed_rpm", speed_rpm), ("trip_speed_rpm", self.trip_speed_rpm)),
+            at_most(("zs9_source_v", self.zs9_source_v), ("zs9_link_v", self.zs9_link_v)),
         ]
     }
 
@@ -360,9 +376,13 @@ fn unknown(name: &str) -> String {
 /// The least number that counts as above 0.
 const ABOVE_ZERO: f64 = 1e-9;
 
+/// Voltage of a two-level inverter's link whose six-step fundamental is the largest voltage of a motor of a nine-switch inverter, over the capacitors' voltage:
+/// π/(4 √3).
+pub const TWO_LEVEL_SHARE: f64 = 0.453_449_841_058_554_5;
+
 /// Unit suffixes of the known keys, longest first.
-const UNITS: [&str; 10] =
-    ["_nm_per_s", "_kg_m2", "_ohm", "_rpm", "_nm", "_hz", "_fraction", "_w", "_a", "_v"];
+const UNITS: [&str; 12] =
+    ["_nm_per_s", "_kg_m2", "_ohm", "_rpm", "_nm", "_hz", "_fraction", "_w", "_a", "_v", "_h", "_f"];
 
 /// Letters to insert, remove or change that turn one word into the other (Levenshtein).
 fn slips(a: &str, b: &str) -> usize {

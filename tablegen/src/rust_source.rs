@@ -8,9 +8,10 @@ use tractive_control::machine::{Curve, Grid, Tables};
 /// `tractive::machine`. The same tables give the same text, byte for byte; every number is the nearest f32, printed so that it
 /// reads back as itself.
 pub fn rust_source(tables: &Tables, types: &str) -> String {
-    let Tables { name, ratings, flux, mtpa, weakening } = tables;
-    let mut out =
-        format!("use {types}::{{Curve, Grid, IronLoss, Machine, Mtpa, Ratings, Tables, Weakening}};\n\n");
+    let Tables { name, ratings, flux, mtpa, weakening, z_source } = tables;
+    let mut out = format!(
+        "use {types}::{{Curve, Grid, IronLoss, Machine, Mtpa, Ratings, Tables, Weakening, ZSourceNetwork}};\n\n"
+    );
     let flux = grid(&mut out, "FLUX", flux);
     let parameters = grid(&mut out, "MTPA_PARAMETERS", &mtpa.parameters);
     let universal = curve(&mut out, "MTPA_UNIVERSAL", &mtpa.universal);
@@ -19,8 +20,9 @@ pub fn rust_source(tables: &Tables, types: &str) -> String {
     let currents = grid(&mut out, "WEAKENING_CURRENTS", &weakening.currents);
     let torque = curve(&mut out, "WEAKENING_TORQUE", &weakening.torque);
     let (flux_knee_wb, share_knee) = (weakening.flux_knee_wb, weakening.share_knee);
-    // The struct's own debug form is its literal.
-    let ratings = format!("{ratings:#?}").replace('\n', "\n    ");
+    // A struct's own debug form is its literal.
+    let [ratings, z_source] =
+        [format!("{ratings:#?}"), format!("{z_source:#?}")].map(|text| text.replace('\n', "\n    "));
     let _ = write!(
         out,
         "/// The tables of the machine that was chosen at build time.
@@ -40,6 +42,7 @@ pub static BUILT_IN: Tables = Tables {{
         flux_knee_wb: {flux_knee_wb:?},
         share_knee: {share_knee:?},
     }},
+    z_source: {z_source},
 }};
 
 /// The machine of [`BUILT_IN`].

@@ -4,7 +4,7 @@ use crate::axis::{Axis, curve, grid};
 use crate::weakening_tables::{MtpaCurrents, weakening_tables};
 use crate::{FluxMap, Iron, MachineFolder, Optimum, Parameters, SmoothMap};
 use libm::hypot;
-use tractive_control::machine::{IronLoss, Mtpa, Ratings, Tables};
+use tractive_control::machine::{IronLoss, Mtpa, Ratings, Tables, ZSourceNetwork};
 
 /// Nodes of the universal curve.
 const UNIVERSAL_NODES: usize = 65;
@@ -58,6 +58,12 @@ impl MachineFolder {
             flux: grid(rows, columns, currents.flux(&smooth)),
             mtpa,
             weakening: weakening_tables(self, &smooth, top_flux_wb, &best.currents()),
+            z_source: ZSourceNetwork {
+                source_v: parameters.zs9_source_v as f32,
+                inductance_h: parameters.zs9_inductance_h as f32,
+                resistance_ohm: parameters.zs9_resistance_ohm as f32,
+                capacitance_f: parameters.zs9_capacitance_f as f32,
+            },
         }
     }
 }

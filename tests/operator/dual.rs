@@ -11,9 +11,7 @@ use tractive::operator::{
 
 use tractive::ports::{DualDriveCommand, DualReport, MotorDemand};
 use tractive::protection::{Fault, SafeState, Trip};
-use tractive::time::{Clock, Instant};
-
-const CLOCK: Clock = Clock::new(25_000_000, 2_500);
+use tractive::time::Instant;
 
 struct World {
     operator: DualOperator,
@@ -26,7 +24,7 @@ struct World {
 
 impl World {
     fn new() -> Self {
-        let ratings = dual::Settings::new(CLOCK, 2_500).operator_ratings(&BUILT_IN.ratings);
+        let ratings = dual::Settings::operator_ratings(&BUILT_IN.ratings);
         let report = DualReport { source_v: 400.0, speed_known: true, ..DualReport::default() };
         Self {
             operator: DualOperator::new(),

@@ -9,7 +9,6 @@ use tractive::protocol::{
     CanEndpoint, Command, Content, MessageSet, ParameterRequest, Parameters, Pattern, Scales, Taken,
     TorqueLimits, Traction, ZS9_PARAMETER_REQUEST, Zs9, Zs9Command, Zs9Content, Zs9Demands,
 };
-use tractive::time::Clock;
 
 const REST: Command = Command::AT_REST;
 
@@ -86,8 +85,7 @@ fn limits_are_the_lower_of_what_is_sent_and_the_parameters() {
 
 #[test]
 fn the_zs9s_request_has_the_levels_of_its_command() {
-    let ratings =
-        DualSettings::new(Clock::new(25_000_000, 2_500), 2_500).operator_ratings(&zs9::BUILT_IN.ratings);
+    let ratings = DualSettings::operator_ratings(&zs9::BUILT_IN.ratings);
     let parameters = Parameters::rated(&ratings);
     let none = Levels::NONE;
     for levels in [

@@ -11,7 +11,6 @@ use tractive::protocol::{
     MOTION, Measured, Message, Payload, Quantity, Receiver, Reject, Scales, Signal, TO_DRIVE, TO_ZS9,
     TORQUE_ESTIMATE, TorqueLimits, VOLTAGES,
 };
-use tractive::time::Clock;
 use tractive_tablegen::MachineFolder;
 
 fn tables(name: &str) -> Tables {
@@ -102,7 +101,7 @@ fn the_papers_machines_have_the_usual_steps() {
 
 /// The ratings by which the ZS9's operator knows two such machines, and its scales.
 fn on_a_zs9(ratings: &Ratings) -> (Ratings, Scales) {
-    let operated = Settings::new(Clock::new(25_000_000, 2_500), 2_500).operator_ratings(ratings);
+    let operated = Settings::operator_ratings(ratings);
     (operated, Scales::of_zs9(&operated))
 }
 

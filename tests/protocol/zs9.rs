@@ -11,12 +11,9 @@ use tractive::protocol::{
     ZS9_COMMAND, ZS9_LIMITS, ZS9_LINK, ZS9_PARAMETER_REQUEST, Zs9, Zs9CanEndpoint, Zs9Command, Zs9Demands,
     Zs9Link, Zs9Measured, Zs9Session,
 };
-use tractive::time::Clock;
-
-const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 
 fn ratings() -> &'static tractive::machine::Ratings {
-    Box::leak(Box::new(Settings::new(CLOCK, 2_500).operator_ratings(&BUILT_IN.ratings)))
+    Box::leak(Box::new(Settings::operator_ratings(&BUILT_IN.ratings)))
 }
 
 fn command(enable: bool, demands: Zs9Demands) -> Payload {

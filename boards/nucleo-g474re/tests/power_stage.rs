@@ -4,7 +4,7 @@
 mod power_stage;
 
 use nucleo_g474re::built_in::{traction, zs9};
-use nucleo_g474re::{dead_time, rates, zs9 as zs9_rates};
+use nucleo_g474re::{dead_time, rates, zs9::rates as zs9_rates};
 use power_stage::Machine;
 use std::path::Path;
 use tractive::control::Gains;

@@ -169,7 +169,8 @@ impl Tables {
     /// # Errors
     /// The first scalar that does not.
     pub const fn check(&self) -> Result<(), Refused> {
-        let Self { name: _, ratings, flux, mtpa, weakening } = self;
+        // The network belongs to one inverter alone, whose drive checks what it makes of it.
+        let Self { name: _, ratings, flux, mtpa, weakening, z_source: _ } = self;
         checked!(ratings.check());
         checked!(check_flux(flux, ratings));
         checked!(check_weakening(weakening, ratings));

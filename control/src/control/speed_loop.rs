@@ -1,6 +1,7 @@
 //! The speed loop: PI with anti-windup. Speed error to torque.
 
 use crate::frames::limit;
+use crate::machine::Ratings;
 
 /// The quantities that the gains follow from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,6 +14,19 @@ pub struct SpeedDesign {
     pub natural_rad_s: f32,
     /// From one step to the next, in s, above 0.
     pub period_s: f32,
+}
+
+impl SpeedDesign {
+    /// Largest torque that a speed error of 1 rad/s may ask for, as a multiple of the largest: more is noise of the speed.
+    pub const STIFFEST: f32 = 10.0;
+
+    /// A loop for what the largest torque turns of a machine: quick, unless that is so heavy that the error's torque would be too stiff.
+    pub const fn of(ratings: &Ratings, natural_rad_s: f32, period_s: f32) -> Self {
+        let inertia_kg_m2 = ratings.max_torque_nm * ratings.pole_pairs / ratings.max_acceleration_rad_s2;
+        let most_rad_s = 0.5 * Self::STIFFEST * ratings.max_torque_nm / inertia_kg_m2;
+        let natural_rad_s = if natural_rad_s < most_rad_s { natural_rad_s } else { most_rad_s };
+        Self { inertia_kg_m2, natural_rad_s, period_s }
+    }
 }
 
 /// Everything that a step works on; speeds mechanical, in rad/s.

@@ -9,6 +9,7 @@
 //! go into the inductors, away from the link, before there can be more of it in the capacitors.
 
 use crate::frames::limit;
+use crate::machine::{Ratings, ZSourceNetwork};
 use core::f32::consts::TAU;
 
 /// The network, the bandwidths and the limits: all that the gains follow from.
@@ -35,6 +36,11 @@ pub struct ZSourceDesign {
     pub inductor_max_a: f32,
 }
 
+/// Bandwidth of the outer loop over the zero in the right half-plane, at most.
+const ZERO_SHARE: f32 = 0.15;
+/// Slope of the link's reference over the source's voltage, in 1/s: it goes as far in 150 ms.
+const SLEW_PER_S: f32 = 6.675;
+
 impl ZSourceDesign {
     /// The ZS9's: 0.5 mH, 10 mΩ, 500 µF; a 10 kHz carrier.
     pub const ZS9: Self = Self {
@@ -51,6 +57,29 @@ impl ZSourceDesign {
         // The motors' full power takes 60 A.
         inductor_max_a: 90.0,
     };
+
+    /// The design for a network and two machines of a kind.
+    ///
+    /// Quicker than by itself: with the motors' power fed forward the loops only have to catch what is left. Of the paper's network phase
+    /// margins are 52° and about 50°; a load step then moves the link by half as much as with 600 and 80 Hz. Of another one the outer loop
+    /// stays as far below the zero in the right half-plane at the motors' full power.
+    pub const fn of(network: &ZSourceNetwork, ratings: &Ratings, period_s: f32) -> Self {
+        let ZSourceNetwork { source_v, inductance_h, resistance_ohm, capacitance_f } = *network;
+        let full_a = 2.0 * ratings.max_power_w / source_v;
+        let zero_hz = source_v / (2.0 * full_a * inductance_h) / TAU;
+        let (quick_hz, lower_hz) = (150.0, ZERO_SHARE * zero_hz);
+        Self {
+            inductance_h,
+            resistance_ohm,
+            capacitance_f,
+            period_s,
+            inner_hz: 700.0,
+            outer_hz: if quick_hz < lower_hz { quick_hz } else { lower_hz },
+            link_slew_v_s: SLEW_PER_S * source_v,
+            inductor_max_a: 1.5 * full_a,
+            ..Self::ZS9
+        }
+    }
 
     /// The gains.
     ///

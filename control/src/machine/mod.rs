@@ -134,6 +134,22 @@ pub struct Tables {
     pub mtpa: Mtpa,
     /// Field weakening.
     pub weakening: Weakening,
+    /// Source and network of a nine-switch inverter; a two-level one has neither.
+    pub z_source: ZSourceNetwork,
+}
+
+/// A Z-source network with the source before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ZSourceNetwork {
+    /// Voltage of the source, nominally, in V, above 0.
+    pub source_v: f32,
+    /// Inductance of each inductor, in H, above 0.
+    pub inductance_h: f32,
+    /// Resistance of each inductor, in ohm, from 0.
+    pub resistance_ohm: f32,
+    /// Capacitance of each capacitor, in F, above 0.
+    pub capacitance_f: f32,
 }
 
 /// The source of a task's tables: behind a reference where they are made at run time; in an image behind a type without fields, so that the

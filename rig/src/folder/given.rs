@@ -5,6 +5,7 @@ use anyhow::{Result, ensure};
 use clap::Args;
 use core::f64::consts::{FRAC_2_PI, TAU};
 use std::path::PathBuf;
+use tractive_tablegen::TWO_LEVEL_SHARE;
 
 /// The limits, and the place of the folder.
 #[derive(Clone, Debug, Args)]
@@ -19,14 +20,17 @@ pub struct Given {
     #[arg(long, value_name = "A", value_parser = finite, allow_negative_numbers = true)]
     pub max_current: f64,
     /// Nominal DC-link voltage, in V.
-    #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
-    pub udc: f64,
+    #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true, required_unless_present = "zs9_source")]
+    pub udc: Option<f64>,
     /// Lowest DC-link voltage in normal operation, in V; default 0.8 of the nominal one.
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
     pub udc_min: Option<f64>,
     /// Highest DC-link voltage in normal operation, in V; default 1.2 of the nominal one.
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
     pub udc_max: Option<f64>,
+    /// Voltage of a Z-source nine-switch inverter's source, in V, instead of a link's: shoot-through makes 4/3 of it of the capacitors' voltage, 3/2 at most.
+    #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true, conflicts_with_all = ["udc", "udc_min", "udc_max"])]
+    pub zs9_source: Option<f64>,
     /// Largest speed, in r/min.
     #[arg(long, value_name = "N", value_parser = finite, allow_negative_numbers = true)]
     pub max_speed_rpm: f64,
@@ -46,6 +50,9 @@ pub struct Given {
     #[arg(long)]
     pub json: bool,
 }
+
+/// Voltages of a nine-switch inverter's capacitors over the source's: without shoot-through, and at a duty of 0.2 and of 0.25.
+const CAPACITORS: [f64; 3] = [1.0, 4.0 / 3.0, 1.5];
 
 /// A value's option, the value, the least and the most that are allowed, and the unit.
 pub struct Range(pub &'static str, pub f64, pub f64, pub f64, pub &'static str);
@@ -67,14 +74,33 @@ pub fn check(ranges: &[Range]) -> Result<()> {
 }
 
 impl Given {
-    /// Lowest, nominal and highest voltage of the link, in V.
+    /// Lowest, nominal and highest voltage of the link of a two-level inverter, in V.
     pub fn link_v(&self) -> [f64; 3] {
-        [self.udc_min.unwrap_or(0.8 * self.udc), self.udc, self.udc_max.unwrap_or(1.2 * self.udc)]
+        match (self.zs9_source, self.udc) {
+            (Some(source_v), _) => CAPACITORS.map(|share| share * source_v * TWO_LEVEL_SHARE),
+            (None, udc) => {
+                let udc = udc.unwrap_or_default();
+                [self.udc_min.unwrap_or(0.8 * udc), udc, self.udc_max.unwrap_or(1.2 * udc)]
+            }
+        }
+    }
+
+    /// The highest voltage that the diodes may charge to without a trip, in V: the link's, or that of a nine-switch inverter's capacitors.
+    pub fn highest_v(&self) -> f64 {
+        self.zs9_source.map_or(self.link_v()[2], |source_v| CAPACITORS[2] * source_v)
+    }
+
+    /// The option that tells the voltage, as it was given.
+    pub fn voltage_option(&self) -> String {
+        match self.zs9_source {
+            Some(source_v) => format!("--zs9-source {source_v}"),
+            None => format!("--udc {}", self.udc.unwrap_or_default()),
+        }
     }
 
     /// The largest fundamental of a phase that the nominal link gives, peak, in V: that of square wave.
     pub fn voltage_v(&self) -> f64 {
-        FRAC_2_PI * self.udc
+        FRAC_2_PI * self.link_v()[1]
     }
 
     /// Electrical angular speed, in rad/s, of a speed in r/min.
@@ -97,6 +123,7 @@ impl Given {
         check(&[
             Range("--rs", self.rs, 0.0, 1e3, "ohm"),
             Range("--max-current", self.max_current, ABOVE_ZERO, 1e5, "A"),
+            Range("--zs9-source", self.zs9_source.unwrap_or(1.0), ABOVE_ZERO, 1e5, "V"),
             Range("--udc", nominal_v, ABOVE_ZERO, 1e5, "V"),
             Range("--udc-min", least_v, ABOVE_ZERO, nominal_v, "V, the nominal one"),
             Range("--udc-max", most_v, nominal_v, 3.0 * nominal_v, "V, three times the nominal one"),
@@ -104,13 +131,13 @@ impl Given {
             Range("--max-switching-hz", self.max_switching_hz, 50.0, 100e3, "Hz"),
             Range("--inertia", self.inertia.unwrap_or(1.0), ABOVE_ZERO, 1e7, "kg·m²"),
         ])?;
-        let most_ohm = 0.5 * self.udc / self.max_current;
+        let most_ohm = 0.5 * nominal_v / self.max_current;
         ensure!(
             self.rs <= most_ohm,
-            "--rs {}: must be at most {most_ohm}: --max-current {} drops no more than half of --udc {} across it",
+            "--rs {}: must be at most {most_ohm}: --max-current {} drops no more than half of the voltage of {} across it",
             self.rs,
             self.max_current,
-            self.udc
+            self.voltage_option()
         );
         let stator_hz = self.max_speed_rpm / 60.0 * f64::from(self.pole_pairs);
         ensure!(
@@ -125,12 +152,13 @@ impl Given {
 
     /// The options as they were given, but for the folder.
     pub fn told(&self) -> String {
-        let Self { pole_pairs, rs, max_current, udc, max_speed_rpm, max_switching_hz, .. } = self;
+        let Self { pole_pairs, rs, max_current, max_speed_rpm, max_switching_hz, .. } = self;
         let optional = [("udc-min", self.udc_min), ("udc-max", self.udc_max), ("inertia", self.inertia)];
         let said = optional.iter().filter_map(|(name, value)| Some(format!(" --{name} {}", (*value)?)));
         let name = self.name.as_ref().map_or(String::new(), |name| format!(" --name {name:?}"));
         format!(
-            " --pole-pairs {pole_pairs} --rs {rs} --max-current {max_current} --udc {udc} --max-speed-rpm {max_speed_rpm} --max-switching-hz {max_switching_hz}{}{name}",
+            " --pole-pairs {pole_pairs} --rs {rs} --max-current {max_current} {} --max-speed-rpm {max_speed_rpm} --max-switching-hz {max_switching_hz}{}{name}",
+            self.voltage_option(),
             said.collect::<String>()
         )
     }

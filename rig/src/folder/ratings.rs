@@ -99,7 +99,8 @@ impl Ratings {
     /// `machine.toml`.
     fn toml(&self, given: &Given, command: &str) -> String {
         let [least_v, nominal_v, most_v] = given.link_v().map(digits);
-        let lines: [(&str, f64, &str); 14] = [
+        let of_source = |key| given.zs9_source.map_or(key, |_| "derived: of zs9_source_v");
+        let lines: [(&str, f64, &str); 16] = [
             ("pole_pairs", f64::from(given.pole_pairs), "given"),
             ("stator_resistance_ohm", given.rs, "given"),
             ("max_torque_nm", self.max_torque_nm, "derived: the most within max_current_a"),
@@ -112,9 +113,15 @@ impl Ratings {
                 self.rated_speed_rpm,
                 "chosen: a little above the speed where weakening begins",
             ),
-            ("dc_link_min_v", least_v, of(given.udc_min, "chosen: 0.8 of the nominal one")),
-            ("dc_link_nominal_v", nominal_v, "given"),
-            ("dc_link_max_v", most_v, of(given.udc_max, "chosen: 1.2 of the nominal one")),
+            ("zs9_source_v", given.zs9_source.unwrap_or(f64::NAN), "given"),
+            (
+                "zs9_link_v",
+                given.zs9_source.map_or(f64::NAN, |source_v| digits(5.0 / 3.0 * source_v)),
+                "chosen: a shoot-through duty of 0.2",
+            ),
+            ("dc_link_min_v", least_v, of_source(of(given.udc_min, "chosen: 0.8 of the nominal one"))),
+            ("dc_link_nominal_v", nominal_v, of_source("given")),
+            ("dc_link_max_v", most_v, of_source(of(given.udc_max, "chosen: 1.2 of the nominal one"))),
             ("max_switching_hz", given.max_switching_hz, "given"),
             (
                 "trip_current_a",
@@ -167,12 +174,13 @@ impl Ratings {
         }
         // Line to line, peak: what the diodes rectify.
         let emf_v = 3.0_f64.sqrt() * given.omega(given.max_speed_rpm) * magnet_wb;
-        let highest_v = digits(given.link_v()[2]);
+        let highest_v = digits(given.highest_v());
+        let whose = given.zs9_source.map_or(("the link's", "it"), |_| ("the capacitors'", "them"));
         if emf_v > highest_v {
             let _ = write!(
                 text,
-                "\nwithout current the machine makes {emf_v:.1} V peak between lines at {} r/min, above the link's {highest_v} V: gates off, the diodes charge it",
-                given.max_speed_rpm,
+                "\nwithout current the machine makes {emf_v:.1} V peak between lines at {} r/min, above {} {highest_v} V: gates off, the diodes charge {}",
+                given.max_speed_rpm, whose.0, whose.1
             );
         }
         if let Some(trip_a) = self.trip_current_a {
@@ -235,10 +243,10 @@ fn check_speed(map: &SmoothMap, given: &Given) -> Result<()> {
     }
     let hint = if low < ODD_SPEED * given.max_speed_rpm { format!("; {UNITS}") } else { String::new() };
     anyhow::bail!(
-        "--max-speed-rpm {}: must be at most {:.0}: above it no current within --max-current {} brings the machine's voltage down to what --udc {} gives{hint}",
+        "--max-speed-rpm {}: must be at most {:.0}: above it no current within --max-current {} brings the machine's voltage down to what {} gives{hint}",
         given.max_speed_rpm,
         low.floor(),
         given.max_current,
-        given.udc
+        given.voltage_option()
     )
 }

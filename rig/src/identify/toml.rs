@@ -16,7 +16,8 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
         given.max_power_w.min(digits((1.0 - 1e-6) * max_torque_nm * given.max_speed_rpm * TAU / 60.0));
     let (resistance, inertia) =
         (digits(outcome.fit.resistance_ohm.max(0.0)), digits(outcome.rotor.inertia_kg_m2));
-    let keys: [(&str, f64, &str); 22] = [
+    let of_zs9 = |key, value| if given.names(key) { value } else { f64::NAN };
+    let keys: [(&str, f64, &str); 27] = [
         ("pole_pairs", f64::from(given.pole_pairs), "given"),
         ("stator_resistance_ohm", resistance, "identified"),
         ("max_torque_nm", max_torque_nm, "given, as far as the map gives it"),
@@ -39,6 +40,11 @@ pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
         ("loss_rated_w", given.loss_rated_w, "given"),
         ("loss_quadratic_fraction", given.loss_quadratic_fraction, "given"),
         ("iron_loss_share", given.iron_loss_share, "given"),
+        ("zs9_source_v", of_zs9("zs9_source_v", given.zs9_source_v), "given"),
+        ("zs9_link_v", of_zs9("zs9_link_v", given.zs9_link_v), "given"),
+        ("zs9_inductance_h", of_zs9("zs9_inductance_h", given.zs9_inductance_h), "given"),
+        ("zs9_resistance_ohm", of_zs9("zs9_resistance_ohm", given.zs9_resistance_ohm), "given"),
+        ("zs9_capacitance_f", of_zs9("zs9_capacitance_f", given.zs9_capacitance_f), "given"),
     ];
     let text = toml(&given.name, "identify", &keys);
     match given.patterns {

@@ -3,7 +3,8 @@
 use crate::machine::Machine;
 use crate::run::refused;
 use anyhow::{Result, anyhow};
-use tractive::drive::dual::{MOST_ACCELERATION_RAD_S2, Settings};
+use tractive::drive::dual::Settings;
+use tractive::machine::Tables;
 use tractive::time::Clock;
 
 /// Carrier period, in ticks.
@@ -11,9 +12,9 @@ pub fn carrier_ticks(clock: &Clock, carrier_hz: u32) -> u32 {
     (clock.ticks_per_s / carrier_hz as f32).round() as u32
 }
 
-/// The drive's settings; without a dead time.
-pub fn drive(clock: Clock, carrier_hz: u32) -> Settings {
-    Settings::new(clock, carrier_ticks(&clock, carrier_hz))
+/// The drive's settings for two machines of a kind; without a dead time.
+pub fn drive(clock: Clock, carrier_hz: u32, tables: &Tables) -> Settings {
+    Settings::new(clock, carrier_ticks(&clock, carrier_hz), tables)
 }
 
 /// The same with a dead time, in s.
@@ -28,21 +29,20 @@ pub fn with_dead_time(settings: Settings, dead_time_s: f64) -> Settings {
 /// Names the machine's key, and what control would need.
 pub fn check(settings: &Settings, machine: &Machine) -> Result<()> {
     let parameters = &machine.folder.parameters;
-    let torque_nm = parameters.max_torque_nm;
     let Err(found) = settings.check(machine.tables) else { return Ok(()) };
     Err(match found.name {
-        "speed.inertia_kg_m2" => {
-            let least_nm = torque_nm * f64::from(found.value / found.most);
-            anyhow!(
-                "max_torque_nm {torque_nm}: must be at least {least_nm:.2} in the ZS9: its speed loops are made for {} kg·m² and would ask for more",
-                settings.speed.inertia_kg_m2
-            )
-        }
+        "ratings.dc_link_max_v" => anyhow!(
+            "dc_link_max_v {}: must be at most {:.1} in the ZS9 with zs9_source_v {}: shoot-through makes no more of its source",
+            parameters.dc_link_max_v,
+            found.most,
+            parameters.zs9_source_v
+        ),
         "ratings.max_acceleration_rad_s2" => {
-            let inertia_kg_m2 = parameters.rotor_inertia_kg_m2;
-            let least_kg_m2 = inertia_kg_m2 * f64::from(found.value / found.most);
+            let (inertia_kg_m2, most) = (parameters.rotor_inertia_kg_m2, found.most);
             anyhow!(
-                "rotor_inertia_kg_m2 {inertia_kg_m2}: must be at least {least_kg_m2:.4} with max_torque_nm {torque_nm} in the ZS9: a rotor that speeds up by more than {MOST_ACCELERATION_RAD_S2:.0} rad/s², electrical, is taken for an angle sensor that fails"
+                "rotor_inertia_kg_m2 {inertia_kg_m2}: must be at least {:.4} with max_torque_nm {} in the ZS9: control follows no rotor that speeds up by more than {most:.0} rad/s², electrical",
+                inertia_kg_m2 * f64::from(found.value / most),
+                parameters.max_torque_nm
             )
         }
         _ => refused(found),

@@ -13,12 +13,11 @@ use crate::protection::{self, FailedCheck, Fault, FrozenWatch, UnexplainedWatch}
 /// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.
 pub const TRACKING_RAD_S: f32 = 4000.0;
 pub use crate::protection::INNOVATION_RAD;
-/// Time over which the speed may change, in s, and by how much in that time, as electrical rad: the rotor itself makes half of it. So a
-/// sensor that begins to count the other way is found where it is too slow for an innovation.
+/// Time over which the speed may change, in s. So a sensor that begins to count the other way is found where it is too slow for an
+/// innovation.
 const SLOW_S: f32 = 5e-3;
-const ASTRAY_RAD: f32 = 0.25;
-/// Largest acceleration of a rotor that is not taken for such a sensor, electrical, in rad/s².
-pub const MOST_ACCELERATION_RAD_S2: f32 = 0.8 * ASTRAY_RAD / (SLOW_S * SLOW_S);
+/// Change of an electrical angle in that time, in rad, below which nothing is told from noise.
+const LEAST_ASTRAY_RAD: f32 = 0.25;
 /// The voltage that the loop may ask for, as a share of the largest one that is to be had at every angle. The modulator gives what its
 /// hexagon has at the angle, up to 1.155, and tells.
 const LOOP_SHARE: f32 = 1.15;
@@ -27,6 +26,13 @@ const LOOP_SHARE: f32 = 1.15;
 const LEFT_SHARE: f32 = 0.5;
 /// Share of the largest voltage at every angle that the operating point may use; the rest regulates.
 const STEADY_SHARE: f32 = 0.98;
+
+/// Change of an electrical angle in [`SLOW_S`] beyond which its sensor has lost the rotor, in rad: of a rotor that speeds up by so much, in rad/s², twice what it
+/// makes itself.
+const fn astray_rad(most_acceleration_rad_s2: f32) -> f32 {
+    let rad = 2.0 * most_acceleration_rad_s2 * (SLOW_S * SLOW_S);
+    if rad > LEAST_ASTRAY_RAD { rad } else { LEAST_ASTRAY_RAD }
+}
 
 /// Control of one motor.
 pub struct Axis<L> {
@@ -91,7 +97,13 @@ impl<L: ControlLaw> Axis<L> {
     }
 
     /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
-    pub fn track(&mut self, angle: Angle, trusted: bool, settings: &Settings) -> Option<f32> {
+    pub fn track(
+        &mut self,
+        angle: Angle,
+        trusted: bool,
+        settings: &Settings,
+        tables: &Tables,
+    ) -> Option<f32> {
         let innovation = self.controller.innovation(angle, &settings.clock);
         let innovation_rad = innovation.signed_radians();
         let known = self.controller.speed_is_known();
@@ -106,7 +118,7 @@ impl<L: ControlLaw> Axis<L> {
             self.slow = self.omega();
             return None;
         }
-        if gone_astray.abs() > ASTRAY_RAD {
+        if gone_astray.abs() > astray_rad(tables.ratings.max_acceleration_rad_s2) {
             self.controller.lose_angle();
             return Some(gone_astray);
         }
@@ -287,7 +299,7 @@ mod tests {
     use crate::time::Clock;
     use core::f64::consts::TAU;
 
-    const SETTINGS: Settings = Settings::new(Clock::new(25_000_000, 2_500), 2_500);
+    const SETTINGS: Settings = Settings::new(Clock::new(25_000_000, 2_500), 2_500, &BUILT_IN);
 
     /// The time, in s, that it takes to notice that a sensor which followed `omega`, electrical in rad/s, follows `then` of that time.
     fn noticed_s(omega: f64, then: impl Fn(f64) -> f64) -> Option<f64> {
@@ -296,7 +308,7 @@ mod tests {
         let mut follow = |omega: f64| {
             radians += omega * period_s;
             let angle = Angle((radians.rem_euclid(TAU) / TAU * 4_294_967_296.0) as u64 as u32);
-            axis.track(angle, false, &SETTINGS)
+            axis.track(angle, false, &SETTINGS, &BUILT_IN)
         };
         for _ in 0..1_000 {
             assert_eq!(follow(omega), None, "sound");
@@ -316,6 +328,9 @@ mod tests {
         for rad_s2 in [-5_000.0, 5_000.0] {
             assert_eq!(noticed_s(100.0, |t_s| 100.0 + rad_s2 * t_s), None, "{rad_s2} rad/s²");
         }
+        // A lighter rotor than this machine's.
+        assert!(noticed_s(100.0, |t_s| 100.0 + 20_000.0 * t_s).is_some());
+        assert_eq!(astray_rad(20_000.0), 1.0);
     }
 
     /// A jump of the angle is told by its size, and a sensor that is trusted may jump; a lost angle's speed is known anew only after a while.
@@ -325,10 +340,10 @@ mod tests {
             let mut axis = Axis::new(Controller::with_tracking(TRACKING_RAD_S));
             let turn = |period: u16| Angle::within_half_turn(0.01 * f32::from(period % 300));
             for period in 0..300 {
-                assert_eq!(axis.track(turn(period), false, &SETTINGS), None);
+                assert_eq!(axis.track(turn(period), false, &SETTINGS, &BUILT_IN), None);
             }
             let jumped = turn(299) + Angle::within_half_turn(0.01 + jump_rad);
-            let got = axis.track(jumped, trusted, &SETTINGS);
+            let got = axis.track(jumped, trusted, &SETTINGS, &BUILT_IN);
             assert_eq!(got.is_some(), told, "{jump_rad} {trusted}: {got:?}");
             assert!(got.is_none_or(|got| (got - jump_rad).abs() < 1e-3), "{got:?}");
             assert!(axis.speed_is_known());
@@ -345,7 +360,7 @@ mod tests {
             let mut angle = Angle::ZERO;
             for _ in 0..300 {
                 angle = angle + Angle::within_half_turn(0.02);
-                axis.track(angle, false, &SETTINGS);
+                axis.track(angle, false, &SETTINGS, &BUILT_IN);
             }
             let emf_v = axis.omega() * BUILT_IN.ratings.magnet_flux_wb;
             let udc_v = emf_v / share * core::f32::consts::FRAC_PI_2;

@@ -19,7 +19,7 @@ type Input<'a> = PeriodInput<'a, Dual>;
 /// Corner of the filter on the voltage limit, in Hz: fed by the link as it is, the limit would make it oscillate.
 const LIMIT_FILTER_HZ: f32 = 10.0;
 /// A motor has at most U_c/(2√3). The link of a two-level inverter whose six-step fundamental is as large, as a share of U_c.
-pub(super) const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
+pub(crate) const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 /// The name of a lost sensor, by motor.
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
@@ -271,7 +271,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let trusted = self.masked.has(fault);
         match measured {
             Some(measured) => axis
-                .track(measured, trusted, &self.settings)
+                .track(measured, trusted, &self.settings, self.machine.tables())
                 .map(|off_rad| (fault, off_rad, axis::INNOVATION_RAD)),
             None => axis.lose_angle(fault, enable),
         }

@@ -25,14 +25,15 @@ mod pwm;
 use super::mailbox::DualOperatorMailboxes;
 use crate::cell::{Mailbox, Seqlock};
 use crate::control::{Gains, SpeedDesign, ZSourceDesign, ZSourceGains};
-use crate::machine::Ratings;
+use crate::machine::{Ratings, Tables};
 use crate::protection::LinkLimits;
 use crate::recorder::DualRecorder;
 use crate::time::Clock;
 use core::sync::atomic::AtomicU32;
 
-pub use axis::{MOST_ACCELERATION_RAD_S2, TRACKING_RAD_S};
+pub use axis::TRACKING_RAD_S;
 pub use control::ControlTask;
+pub(crate) use control::TWO_LEVEL_SHARE;
 pub use messages::{DualApplied, DualCommand, MotorCommand, MotorShare};
 pub use pwm::PwmTask;
 
@@ -73,12 +74,11 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The ZS9's, with a carrier period in ticks.
-    pub const fn new(clock: Clock, carrier_ticks: u32) -> Self {
+    /// The ZS9's for two machines of a kind, with a carrier period in ticks.
+    pub const fn new(clock: Clock, carrier_ticks: u32, tables: &Tables) -> Self {
+        let Tables { ratings, z_source, .. } = tables;
         let period_s = clock.control_ticks as f32 * clock.tick_s;
-        // Quicker than by itself: with the motors' power fed forward the loops only have to catch what is left. Phase margins 52°
-        // and about 50°; a load step then moves the link by half as much as with 600 and 80 Hz.
-        let link = ZSourceDesign { period_s, inner_hz: 700.0, outer_hz: 150.0, ..ZSourceDesign::ZS9 };
+        let link = ZSourceDesign::of(z_source, ratings, period_s);
         Self {
             clock,
             carrier_ticks,
@@ -90,27 +90,27 @@ impl Settings {
                 sixth_turn_rad: TURNS as f32 * Gains::DEFAULT.sixth_turn_rad,
                 ..Gains::DEFAULT
             },
-            speed: SpeedDesign {
-                inertia_kg_m2: 0.1,
-                natural_rad_s: 280.0,
-                period_s: TURNS as f32 * period_s,
-            },
+            speed: SpeedDesign::of(ratings, 280.0, TURNS as f32 * period_s),
             link,
             link_gains: link.gains(),
-            limits: LinkLimits { source_min_v: 280.0, capacitor_max_v: 720.0, duty_max: link.duty_max },
+            limits: LinkLimits {
+                source_min_v: ratings.trip_dc_under_v / TWO_LEVEL_SHARE,
+                capacitor_max_v: ratings.trip_dc_over_v / TWO_LEVEL_SHARE,
+                duty_max: link.duty_max,
+            },
         }
     }
 
     /// The ratings as the operator looks at them: link voltages are those of the capacitors, and its trip levels the drive's own.
-    pub const fn operator_ratings(&self, ratings: &Ratings) -> Ratings {
+    pub const fn operator_ratings(ratings: &Ratings) -> Ratings {
         Ratings {
-            dc_link_min_v: LOWEST_SHARE * ratings.dc_link_min_v / control::TWO_LEVEL_SHARE,
-            dc_link_nominal_v: ratings.dc_link_nominal_v / control::TWO_LEVEL_SHARE,
-            dc_link_max_v: ratings.dc_link_max_v / control::TWO_LEVEL_SHARE,
-            trip_dc_over_v: self.limits.capacitor_max_v,
+            dc_link_min_v: LOWEST_SHARE * ratings.dc_link_min_v / TWO_LEVEL_SHARE,
+            dc_link_nominal_v: ratings.dc_link_nominal_v / TWO_LEVEL_SHARE,
+            dc_link_max_v: ratings.dc_link_max_v / TWO_LEVEL_SHARE,
+            trip_dc_over_v: ratings.trip_dc_over_v / TWO_LEVEL_SHARE,
             // Once the gates go off, what is above the source's voltage swings as far below it; a source that is lost has a limit
             // of its own.
-            trip_dc_under_v: 0.5 * self.limits.source_min_v,
+            trip_dc_under_v: 0.5 * ratings.trip_dc_under_v / TWO_LEVEL_SHARE,
             ..*ratings
         }
     }

@@ -326,7 +326,7 @@ mod tests {
         let on = Expected { must_be_on: 1, may_be_on: 1, is_off: 0 };
         let off = Expected { must_be_on: 0, may_be_on: 0, is_off: 1 };
         let both = Expected { must_be_on: 1, may_be_on: 1, is_off: 1 };
-        let settings = Settings::new(Clock::new(25_000_000, 2_500), 2_500);
+        let settings = Settings::new(Clock::new(25_000_000, 2_500), 2_500, &crate::built_in::zs9::BUILT_IN);
         let mut task = PwmTask::new(&BUILT_IN, settings).beginning_at(Instant(70));
         assert_eq!(task.next_call(), Instant(70 + 1_250), "a peak is half a carrier period on");
         for (before, running, seen_on, seen_off, told) in [

@@ -90,7 +90,7 @@ impl Host {
     pub fn new(stage: &Stage, tables: &'static Tables, zeros: &[u32]) -> Self {
         let ticks_per_s = CORE_HZ / TICK_CYCLES;
         let clock = Clock::new(ticks_per_s, ticks_per_s / CONTROL_HZ);
-        let settings = Settings::new(clock, clock.control_ticks);
+        let settings = Settings::new(clock, clock.control_ticks, tables);
         let turns = (tables.ratings.pole_pairs as u64) << 32;
         let units_per_count = ((turns + stage.encoder_counts / 2) / stage.encoder_counts) as u32;
         let rotor = |degrees: f64| {

@@ -120,8 +120,8 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
         return Err(stage.refuse("z_source", "is missing".to_owned()));
     };
     stage.check_times(ZS9_DEAD_TIME_NS)?;
-    let settings = zs9_rates::settings();
-    let operated = settings.operator_ratings(&machine.tables.ratings);
+    let settings = zs9_rates::settings(machine.tables);
+    let operated = tractive::drive::dual::Settings::operator_ratings(&machine.tables.ratings);
     let capacitor_v = f64::from(settings.limits.capacitor_max_v);
     stage.check_sensors(machine, capacitor_v, "the capacitors' highest voltage", 2)?;
     let inductor_a = f64::from(settings.link.inductor_max_a);

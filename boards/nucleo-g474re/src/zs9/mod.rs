@@ -26,10 +26,16 @@ mod chip;
 #[cfg(target_os = "none")]
 pub use chip::*;
 pub use ports::{Control, Pwm};
-pub use rates::{CARRIER_TICKS, CLOCK, CONTROL_HZ, CYCLES_PER_TICK, HALF_CYCLES, settings};
+pub use rates::{CARRIER_TICKS, CLOCK, CONTROL_HZ, CYCLES_PER_TICK, HALF_CYCLES};
 
 use crate::built_in::zs9::BUILT_IN;
+use tractive::drive::dual::Settings;
 use tractive::machine::Ratings;
 
 /// The ratings as the operator looks at them.
-pub static RATINGS: Ratings = settings().operator_ratings(&BUILT_IN.ratings);
+pub static RATINGS: Ratings = Settings::operator_ratings(&BUILT_IN.ratings);
+
+/// The settings of the drive's tasks.
+pub const fn settings() -> Settings {
+    rates::settings(&BUILT_IN)
+}

@@ -2,6 +2,7 @@
 
 use crate::rates::CORE_HZ;
 use tractive::drive::dual::Settings;
+use tractive::machine::Tables;
 use tractive::time::Clock;
 
 /// Cycles of the timers' clock in a tick of the drive's.
@@ -34,7 +35,7 @@ pub const HALF_CYCLES: u16 = {
     cycles as u16
 };
 
-/// The settings of the drive's tasks.
-pub const fn settings() -> Settings {
-    Settings::new(CLOCK, CARRIER_TICKS)
+/// The settings of the drive's tasks for two machines of a kind.
+pub const fn settings(tables: &Tables) -> Settings {
+    Settings::new(CLOCK, CARRIER_TICKS, tables)
 }

@@ -25,7 +25,8 @@ impl Drive {
             }
             _ => CURRENT_SHARE * trip_a,
         };
-        let highest_v = f64::from(settings::drive(CLOCK, CARRIER_HZ).limits.capacitor_max_v);
+        let highest_v =
+            f64::from(settings::drive(CLOCK, CARRIER_HZ, self.machine.tables).limits.capacitor_max_v);
         let uc_v = forced_uc_v(observed).max(highest_v);
         Allowed {
             longest_s: self.longest_s(case, seen),

@@ -17,11 +17,11 @@ use crate::bench::{Flaws, Limits, Simulated};
 use crate::inject::Injection;
 use crate::inject::zs9::Kind;
 use crate::machine::Machine;
-use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
+use crate::plant::zs9::{NetworkState, ZNetwork, Zs9Plant, Zs9Settings};
 use crate::plant::{PlantSettings, SpeedSource};
 use crate::run::{CLOCK, Interrupts};
 use crate::scenario::System;
-use crate::scenario::zs9::{SOURCE_V, Zs9};
+use crate::scenario::zs9::Zs9;
 use crate::zs9::bench::{Bench, BenchSettings};
 use crate::zs9::run::Tasks;
 use crate::zs9::trace::Row;
@@ -33,7 +33,6 @@ use tractive::machine::Tables;
 use tractive::ports::MotorDemand;
 use tractive::time::Instant;
 
-const LINK_V: f64 = 667.0;
 const CARRIER_HZ: u32 = 10_000;
 /// Share of the torque envelope that is asked for.
 const SHARE: f64 = 0.6;
@@ -57,7 +56,7 @@ impl Drive {
     /// For two of the ZS9's machines.
     pub fn new(without: Option<Ablation>) -> Result<Self> {
         let machine = Machine::load(Zs9::MACHINE)?;
-        let mut settings = settings::drive(CLOCK, CARRIER_HZ);
+        let mut settings = settings::drive(CLOCK, CARRIER_HZ, machine.tables);
         let mut tables = machine.tables;
         if let Some(without) = without {
             settings.limits = without.link_limits(settings.limits);
@@ -124,7 +123,7 @@ impl Drive {
             SpeedSource::profile([(LEAD_S + at_s, from_rpm)].into_iter().chain(faster).collect())
         });
         let motor = PlantSettings { flux_scale, ..PlantSettings::default() };
-        let limits = settings::drive(CLOCK, CARRIER_HZ).limits;
+        let limits = settings::drive(CLOCK, CARRIER_HZ, self.machine.tables).limits;
         let bench = BenchSettings {
             scheme,
             injection: Some(Injection { kind, at_s }),
@@ -142,21 +141,22 @@ impl Drive {
 
     /// Both motors on a network that is charged.
     fn plant(&self, speeds: [SpeedSource; 2], motor: PlantSettings) -> Zs9Plant {
-        let settings = Zs9Settings { source_v: SOURCE_V, motors: [motor; 2], ..Zs9Settings::default() };
+        let parameters = &self.machine.folder.parameters;
+        let (source_v, network) = (parameters.zs9_source_v, ZNetwork::of(parameters));
+        let settings = Zs9Settings { network, source_v, motors: [motor; 2], ..Zs9Settings::default() };
         let mut plant = Zs9Plant::new([&self.machine.folder; 2], speeds, &settings);
-        plant.network = NetworkState::even(0.0, 0.5 * (LINK_V + SOURCE_V));
+        plant.network = NetworkState::even(0.0, 0.5 * (parameters.zs9_link_v + source_v));
         plant
     }
 
     /// A sound bench.
     fn bench_settings(&self, duration_s: f64, flaws: Flaws) -> BenchSettings {
         BenchSettings {
-            clock: CLOCK,
-            carrier_ticks: settings::carrier_ticks(&CLOCK, CARRIER_HZ),
+            drive: settings::drive(CLOCK, CARRIER_HZ, self.machine.tables),
             lead_s: LEAD_S,
             duration_s,
             trace_step_s: f64::from(CARRIER_HZ).recip(),
-            link_ref_v: LINK_V,
+            link_ref_v: self.machine.folder.parameters.zs9_link_v,
             scheme: cases::SCHEMES[0],
             flaws,
             injection: Some(Injection { kind: Kind::Elsewhere, at_s: -LEAD_S }),

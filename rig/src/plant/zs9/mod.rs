@@ -87,6 +87,7 @@ pub struct Zs9Energies {
 pub struct Zs9Plant {
     /// Inductances and capacitances of the network; change them, as all of this, between two steps.
     pub parts: ZNetwork,
+    whole: ZNetwork,
     /// The connection between source and network.
     pub source: Source,
     /// Source voltage U_dc, in V, above 0.
@@ -122,6 +123,7 @@ impl Zs9Plant {
         ];
         Self {
             parts: settings.network,
+            whole: settings.network,
             source: settings.source,
             source_v: settings.source_v,
             clamp: clamp.of_both(&other),
@@ -134,6 +136,11 @@ impl Zs9Plant {
             energies: Zs9Energies::default(),
             means: Adder::default(),
         }
+    }
+
+    /// Has the network's parts be those that it was made with.
+    pub fn mend_network(&mut self) {
+        self.parts = self.whole;
     }
 
     /// Has both machines' true flux linkage be another multiple of their maps', above 0. Currents stay as they are.

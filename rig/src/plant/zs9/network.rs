@@ -1,5 +1,7 @@
 //! The Z-source network.
 
+use tractive_tablegen::Parameters;
+
 /// Two equal inductors and two equal capacitors, crosswise between source and bridge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZNetwork {
@@ -21,8 +23,17 @@ pub struct NetworkState {
 }
 
 impl ZNetwork {
-    /// The ZS9's: 0.5 mH, 10 mΩ, 500 µF.
+    /// The paper's ZS9: 0.5 mH, 10 mΩ, 500 µF.
     pub const ZS9: Self = Self { inductance_h: 0.5e-3, resistance_ohm: 10e-3, capacitance_f: 500e-6 };
+
+    /// The one that a machine folder names.
+    pub fn of(parameters: &Parameters) -> Self {
+        Self {
+            inductance_h: parameters.zs9_inductance_h,
+            resistance_ohm: parameters.zs9_resistance_ohm,
+            capacitance_f: parameters.zs9_capacitance_f,
+        }
+    }
 
     /// Rates of change, in A/s and V/s, with `feed_v` across the source's side and `bridge_a` into the bridge:
     /// `L di1/dt = u_s − v2 − r i1`, `L di2/dt = u_s − v1 − r i2`, `C dv1/dt = i2 − i_in`, `C dv2/dt = i1 − i_in`.

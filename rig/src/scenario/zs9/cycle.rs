@@ -2,7 +2,6 @@
 
 use super::prelude::*;
 use crate::options::number;
-use crate::plant::zs9::ZNetwork;
 use crate::scenario::{System, drive};
 use clap::ValueEnum;
 
@@ -126,13 +125,12 @@ impl Scenario<Zs9> for Cycle {
         returned(&mut figures, rows, &of);
         cruise(&mut figures, rows, of.cruise_nm);
         figures.set("end_speed_rpm", rows.last().map(|row| row.motors[0].speed_rpm));
-        figures::link(&mut figures, rows, options.own.uin);
-        let source_v = super::SOURCE_V;
-        let wanted_v = 0.5 * (options.own.uin + options.udc.unwrap_or(source_v));
+        figures::link(&mut figures, rows, link_v(options, machine));
+        let wanted_v = super::capacitor_v(options, machine);
         let highest_v = figures::largest(rows, |row| row.capacitor_v);
         figures.set("capacitor_overshoot_percent", (highest_v / wanted_v - 1.0) * 100.0);
         figures.set("power_residual_percent", residual_percent(rows));
-        figures.set("network_stored_j", ZNetwork::ZS9.capacitance_f * wanted_v * wanted_v);
+        figures.set("network_stored_j", machine.folder.parameters.zs9_capacitance_f * wanted_v * wanted_v);
         if self.second == Second::Other {
             self.independence(&mut figures, recording, options, machine);
         }
@@ -185,7 +183,7 @@ impl Cycle {
             ("link voltage off in %", "link_deviation_percent", link),
         ];
         let apart = if self.second == Second::Other { &apart[..] } else { &[] };
-        judge(figures, options, &[&bounds[..], apart].concat())
+        judge(figures, options, machine, &[&bounds[..], apart].concat())
     }
 
     /// By how much motor 1 does something else than in the same run with a motor 2 that makes no torque.

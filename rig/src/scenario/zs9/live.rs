@@ -68,10 +68,10 @@ impl Live {
             ..Plan::driven((0.0, ROOM_S), held, [start.speed_rpm; 2], nothing)
         };
         let bench = bench(plan, &options, machine)?.endless();
-        let drive = settings::drive(CLOCK, options.own.carrier_hz);
+        let drive = settings::drive(CLOCK, options.own.carrier_hz, machine.tables);
         settings::check(&drive, machine)?;
-        let link_ref_v = options.own.uin;
-        let ratings = drive.operator_ratings(&machine.tables.ratings);
+        let link_ref_v = link_v(&options, machine);
+        let ratings = Settings::operator_ratings(&machine.tables.ratings);
         let request = Arc::new(Mutex::new(DualRequest::idle(&ratings, link_ref_v as f32)));
         Ok(Self {
             bench,

@@ -52,7 +52,7 @@ impl Scenario<Zs9> for LoadStep {
         figures.set("motor2_speed_deviation_rpm", figures::largest(after, off));
         figures.set("motor2_back_within_0p2_percent_ms", back_ms(after, |row| off(row) > 0.002 * speed_rpm));
         figures.set("motor2_peak_torque_nm", figures::largest(after, |row| row.motors[1].torque_nm));
-        figures::link(&mut figures, after, options.own.uin);
+        figures::link(&mut figures, after, link_v(options, machine));
         figures.set("verdicts", self.verdicts(&figures, options, machine));
         figures
     }
@@ -88,6 +88,7 @@ impl LoadStep {
         judge(
             figures,
             options,
+            machine,
             &[
                 ("motor 1's torque moved in N·m", "motor1_torque_deviation_nm", at_most(0.023, moved_nm)),
                 ("motor 1's speed moved in r/min", "motor1_speed_deviation_rpm", at_most(0.0011, moved_rpm)),

@@ -24,7 +24,7 @@ use crate::law::LawName;
 use crate::machine::Machine;
 use crate::options::{On, positive};
 use crate::plant::SpeedSource;
-use crate::plant::zs9::{NetworkState, Zs9Plant, Zs9Settings};
+use crate::plant::zs9::{NetworkState, ZNetwork, Zs9Plant, Zs9Settings};
 use crate::report::Page;
 use crate::run::{CLOCK, Supervisor, on_host};
 use crate::verdict::{Verdict, bound};
@@ -47,11 +47,8 @@ use tractive::recorder::DualRecorder;
 use tractive::time::Instant;
 use tractive::wire::DualSetup;
 
-/// Source voltage, in V.
-pub const SOURCE_V: f64 = 400.0;
-
-/// Largest source and link voltage that is simulated, in V: the drive trips long before.
-const LARGEST_V: f64 = 1200.0;
+/// Largest source and link voltage that is simulated, over the source's nominal one: the drive trips long before.
+const LARGEST: f64 = 3.0;
 
 /// Two motors on a Z-source nine-switch inverter.
 #[derive(Clone, Copy, Debug)]
@@ -63,9 +60,9 @@ pub struct Zs9Options {
     /// Carrier frequency, in Hz, 10000 or 20000.
     #[arg(long, default_value_t = 10_000, value_parser = carrier_hz, allow_negative_numbers = true)]
     pub carrier_hz: u32,
-    /// Link voltage outside shoot-through, in V: 667 is a shoot-through duty of 0.2, 800 of 0.25.
-    #[arg(long, default_value_t = 667.0, value_parser = positive, allow_negative_numbers = true)]
-    pub uin: f64,
+    /// Link voltage outside shoot-through, in V; default the machine's, the paper's 667, a shoot-through duty of 0.2.
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
+    pub uin: Option<f64>,
     /// Place of the zero vectors: s, rs, rthd, zvo, rthd-central or rthd-slide.
     #[serde(serialize_with = "scheme_name")]
     #[arg(long, default_value = "rthd", value_parser = scheme)]
@@ -136,8 +133,8 @@ impl System for Zs9 {
     type Plan = Plan;
     type Recording = Recording;
 
-    fn source_v(_machine: &Machine) -> f64 {
-        SOURCE_V
+    fn source_v(machine: &Machine) -> f64 {
+        machine.folder.parameters.zs9_source_v
     }
 
     fn trace_step_s(own: &Zs9Options) -> f64 {
@@ -145,7 +142,7 @@ impl System for Zs9 {
     }
 
     fn tailored(command: Command) -> Command {
-        let udc = format!("Voltage of the DC source, in V; default {SOURCE_V}");
+        let udc = "Voltage of the DC source, in V; default the machine's, the paper's 400";
         command.mut_arg("udc", |arg| arg.help(udc)).mut_arg("min_pulse_us", |arg| arg.hide(true))
     }
 
@@ -156,27 +153,28 @@ impl System for Zs9 {
         if let Some(step_nm) = scenario.get("step").and_then(Value::as_f64) {
             scaled::check_step(step_nm, machine)?;
         }
-        let source_v = options.udc.unwrap_or(SOURCE_V);
-        let link_ref_v = options.own.uin;
-        if source_v > LARGEST_V {
-            bail!("--udc {source_v}: must be at most {LARGEST_V} V");
+        let (source_v, link_ref_v) = (source_v(options, machine), link_v(options, machine));
+        let largest_v = LARGEST * Self::source_v(machine);
+        if source_v > largest_v {
+            bail!("--udc {source_v}: must be at most {largest_v} V");
         }
-        if !(source_v..=LARGEST_V).contains(&link_ref_v) {
-            bail!("--uin {link_ref_v}: must be from the source's {source_v} V to {LARGEST_V} V");
+        if !(source_v..=largest_v).contains(&link_ref_v) {
+            bail!("--uin {link_ref_v}: must be from the source's {source_v} V to {largest_v} V");
         }
-        let link_v = capacitor_v(options);
+        let link_v = capacitor_v(options, machine);
         options.own.device_drop.unwrap_or_default().check(link_v, machine)?;
         options.check_flaws(machine, source_v)
     }
 
     fn filled(options: &Options, machine: &Machine) -> Options {
-        if !options.own.real {
-            return options.clone();
+        let own = Zs9Options { uin: Some(link_v(options, machine)), ..options.own.clone() };
+        if !own.real {
+            return Options { run: options.run.clone(), own };
         }
-        let inverter = RealInverter { link_v: capacitor_v(options), ..RealInverter::of(machine) };
+        let inverter = RealInverter { link_v: capacitor_v(options, machine), ..RealInverter::of(machine) };
         let inverter = RealInverter { switching_hz: options.own.carrier_hz.into(), ..inverter };
         let device_drop = options.own.device_drop.or(Some(inverter.drops(machine)));
-        let own = Zs9Options { device_drop, ..options.own.clone() };
+        let own = Zs9Options { device_drop, ..own };
         Options { run: inverter.run(&options.run, machine), own }
     }
 
@@ -189,14 +187,14 @@ impl System for Zs9 {
     ) -> Result<Recording> {
         let line = plan.line;
         let bench = bench(plan, options, machine)?;
-        let settings = settings::drive(CLOCK, options.own.carrier_hz);
+        let settings = settings::drive(CLOCK, options.own.carrier_hz, machine.tables);
         let told_us = if options.own.uncompensated { 0.0 } else { options.dead_time_us };
         let settings = settings::with_dead_time(settings, told_us * 1e-6);
         settings::check(&settings, machine)?;
         let (on, law) = options.choice()?;
         match on {
             On::Host => {
-                let ratings = settings.operator_ratings(&machine.tables.ratings);
+                let ratings = Settings::operator_ratings(&machine.tables.ratings);
                 let line = line.map(|times| {
                     Line::rated(&ratings, times.precharge_s, times.discharge_s).without_chopper()
                 });
@@ -254,7 +252,7 @@ impl OnHost<'_> {
 
 fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     let Plan { lead_s, duration_s, .. } = plan;
-    let Zs9Options { carrier_hz, uin: link_ref_v, scheme, inject, .. } = options.own;
+    let Zs9Options { carrier_hz, scheme, inject, .. } = options.own;
     if let Some(injection) = inject
         && !(0.0..=duration_s).contains(&injection.at_s)
     {
@@ -266,18 +264,18 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     if written_step_s < f64::from(shortest_s) || written_step_s > longest_s {
         bail!("--dt {written_step_s}: must be a number from {shortest_s} to {longest_s}");
     }
-    let source_v = options.udc.unwrap_or(SOURCE_V);
+    let (source_v, link_ref_v) = (source_v(options, machine), link_v(options, machine));
+    let network = ZNetwork::of(&machine.folder.parameters);
     let drops = options.own.device_drop.unwrap_or_default().devices();
     let motors = [options.plant(); 2];
-    let plant_settings = Zs9Settings { source_v, motors, drops, ..Zs9Settings::default() };
+    let plant_settings = Zs9Settings { network, source_v, motors, drops, ..Zs9Settings::default() };
     let mut plant = Zs9Plant::new([&machine.folder; 2], plan.speeds, &plant_settings);
     plant.network = NetworkState::even(0.0, 0.5 * (link_ref_v + source_v));
     for (motor, rpm) in plant.motors.iter_mut().zip(plan.from_rpm) {
         motor.set_speed_rpm(rpm);
     }
     let settings = BenchSettings {
-        clock: CLOCK,
-        carrier_ticks: settings::carrier_ticks(&CLOCK, carrier_hz),
+        drive: settings::drive(CLOCK, carrier_hz, machine.tables),
         lead_s,
         duration_s,
         trace_step_s: judged_step_s,
@@ -293,9 +291,19 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     Ok(if written_step_s == judged_step_s { bench } else { bench.writing_every(written_step_s) })
 }
 
+/// Voltage of the source, in V.
+fn source_v(options: &Options, machine: &Machine) -> f64 {
+    options.udc.unwrap_or(Zs9::source_v(machine))
+}
+
+/// Voltage of the link outside shoot-through that is wanted, in V.
+pub fn link_v(options: &Options, machine: &Machine) -> f64 {
+    options.own.uin.unwrap_or(machine.folder.parameters.zs9_link_v)
+}
+
 /// Voltage of the capacitors that is wanted, in V: of it are the link's pulses.
-fn capacitor_v(options: &Options) -> f64 {
-    0.5 * (options.own.uin + options.udc.unwrap_or(SOURCE_V))
+fn capacitor_v(options: &Options, machine: &Machine) -> f64 {
+    0.5 * (link_v(options, machine) + source_v(options, machine))
 }
 
 /// Free rotors, loaded by what the operator says.
@@ -303,13 +311,16 @@ pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
     [(); 2].map(|()| SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 })
 }
 
-/// Link voltage from which figures are judged, in V: the lowest at which bounds are known. At less the link's own are farther off.
-pub const LEAST_JUDGED_V: f64 = 667.0;
-
-/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or a link below [`LEAST_JUDGED_V`], they are only reported; but
-/// one that never came, where nothing was injected, falls short of any bound.
-pub fn judge(figures: &Figures, options: &Options, bounds: &[(&str, &str, f64)]) -> Vec<Verdict> {
-    let judged = options.own.uin >= LEAST_JUDGED_V && options.own.device_drop.is_none();
+/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or a link below the machine's own, they are only reported: there
+/// the link's are farther off. But one that never came, where nothing was injected, falls short of any bound.
+pub fn judge(
+    figures: &Figures,
+    options: &Options,
+    machine: &Machine,
+    bounds: &[(&str, &str, f64)],
+) -> Vec<Verdict> {
+    let has_link = link_v(options, machine) >= machine.folder.parameters.zs9_link_v;
+    let judged = has_link && options.own.device_drop.is_none();
     let verdict = |(what, name, at_most): &(&str, &str, f64)| {
         let at_most = if judged { bound(options, *at_most, f64::INFINITY) } else { f64::INFINITY };
         let verdict = Verdict::at_most(what, figures.number(name), at_most);

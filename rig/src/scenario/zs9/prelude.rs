@@ -1,7 +1,7 @@
 //! The names that every scenario of the ZS9 is written with.
 
 pub use super::scaled::{LINK_OFF_PERCENT, known, scaled_kg_m2, scaled_nm, scaled_rpm};
-pub use super::{LEAST_JUDGED_V, Options, Plan, Zs9, Zs9Options, free, judge, rad_s, ramp};
+pub use super::{Options, Plan, Zs9, Zs9Options, free, judge, link_v, rad_s, ramp};
 pub use crate::analysis::Figures;
 pub use crate::machine::Machine;
 pub use crate::plant::SpeedSource;

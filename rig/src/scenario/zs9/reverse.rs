@@ -70,7 +70,7 @@ impl Scenario<Zs9> for Reverse {
         let last = figures::window(recording, end_s - 0.1, end_s);
         figures.set("motor1_speed_rpm", mean(last, |row| row.motors[0].speed_rpm));
         figures.set("motor2_speed_rpm", mean(last, |row| row.motors[1].speed_rpm));
-        figures::link(&mut figures, &recording.rows, options.own.uin);
+        figures::link(&mut figures, &recording.rows, link_v(options, machine));
         let off_rpm = scaled_rpm(1.0, machine);
         let bounds = [
             (
@@ -85,7 +85,7 @@ impl Scenario<Zs9> for Reverse {
             ),
             ("link voltage off in %", "link_deviation_percent", known(machine, 0.5, LINK_OFF_PERCENT)),
         ];
-        figures.set("verdicts", judge(&figures, options, &bounds));
+        figures.set("verdicts", judge(&figures, options, machine, &bounds));
         figures
     }
 

@@ -66,7 +66,7 @@ impl Scenario<Zs9> for Steady {
         let currents = || recording.rows.iter().map(|row| row.inductor_a);
         let (low, high) = currents().fold((f64::MAX, f64::MIN), |(low, high), i| (low.min(i), high.max(i)));
         figures.set("inductor_ripple_a", high - low);
-        figures::link(&mut figures, &recording.rows, options.own.uin);
+        figures::link(&mut figures, &recording.rows, link_v(options, machine));
         let torques = torque_verdicts(off_percent, options, machine);
         figures.set("verdicts", [verdicts(&figures, options, machine), torques.to_vec()].concat());
         figures
@@ -103,14 +103,15 @@ fn torque_verdicts(off_percent: [f64; 2], options: &Options, machine: &Machine) 
 
 /// Bounds where something is known of the machine and the scheme at this carrier and link.
 fn verdicts(figures: &Figures, options: &Options, machine: &Machine) -> Vec<Verdict> {
-    let Zs9Options { carrier_hz, uin, scheme, .. } = options.own;
-    let bounds =
-        BOUNDS.iter().find(|(one, _)| *one == scheme && (carrier_hz, uin) == (10_000, LEAST_JUDGED_V));
+    let Zs9Options { carrier_hz, scheme, .. } = options.own;
+    let usual = carrier_hz == 10_000 && link_v(options, machine) == machine.folder.parameters.zs9_link_v;
+    let bounds = BOUNDS.iter().find(|(one, _)| *one == scheme && usual);
     let [upper, lower, ripple] =
         bounds.filter(|_| machine.is(Zs9::MACHINE)).map_or([f64::INFINITY; 3], |(_, bounds)| *bounds);
     judge(
         figures,
         options,
+        machine,
         &[
             ("current THD of the upper motor in %", "thd1_percent", upper),
             ("current THD of the lower motor in %", "thd2_percent", lower),

@@ -48,7 +48,7 @@ impl Scenario<Zs9> for Timing {
         Plan::driven((LEAD_S, DURATION_S), [turning(1.0), turning(-1.0)], [0.0; 2], operator)
     }
 
-    fn figures(&self, recording: &Recording, options: &Options, _machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let mut figures = figures::common(recording);
         for (name, (from_s, to_s)) in [MOTORING, BRAKING] {
             figures.set(name, off_percent(figures::window(recording, from_s, to_s)));
@@ -60,7 +60,7 @@ impl Scenario<Zs9> for Timing {
             ("torque off in weakening at 1,450 r/min, motoring in %", MOTORING.0, MOST_OFF_PERCENT),
             ("the same, braking in %", BRAKING.0, braking),
         ];
-        figures.set("verdicts", judge(&figures, options, &bounds));
+        figures.set("verdicts", judge(&figures, options, machine, &bounds));
         figures
     }
 

@@ -4,7 +4,6 @@ use super::{Bench, BenchError};
 use crate::bench::Tick;
 use crate::inject::zs9::Kind;
 use crate::zs9::settings::with_dead_time;
-use tractive::drive::dual::Settings;
 
 impl Bench {
     /// The next period takes over at a valley.
@@ -17,8 +16,7 @@ impl Bench {
         }
         if let Some(Kind::Gate(gate, false)) = self.spoiler.injected.kind(self.time.now_s()) {
             let pause = &period.gates[usize::from(gate)];
-            let drive = Settings::new(self.settings.clock, self.settings.carrier_ticks);
-            let drive = with_dead_time(drive, self.settings.dead_time_s);
+            let drive = with_dead_time(self.settings.drive, self.settings.dead_time_s);
             // Dead times may swallow a shorter pulse.
             if pause.off_to - pause.off_from < drive.longest_pause_steps() {
                 self.observed.makes_a_difference(self.time.now);

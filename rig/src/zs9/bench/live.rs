@@ -5,7 +5,7 @@ use crate::bench::{Limits, Observed, Tick};
 use crate::inject::Injection;
 use crate::inject::zs9::{Kind, Spoiler};
 use crate::plant::Motor;
-use crate::plant::zs9::{Source, ZNetwork};
+use crate::plant::zs9::Source;
 use crate::zs9::trace::{Edge, Row};
 use tractive::nine_switch::Scheme;
 use tractive::operator::DualStatus;
@@ -69,6 +69,6 @@ impl Bench {
         self.spoiler = Spoiler::new(None);
         self.observed = Observed::new(Tick::MAX, Limits::NONE);
         self.plant.source = Source::Bidirectional;
-        self.plant.parts = ZNetwork::ZS9;
+        self.plant.mend_network();
     }
 }

@@ -75,7 +75,7 @@ pub struct Bench {
 impl Bench {
     /// A bench at its first instant, gates off.
     pub fn new(plant: Zs9Plant, mut operator: Box<dyn Operator + Send>, settings: BenchSettings) -> Self {
-        let time = Timeline::new(settings.clock, COMPARE_STEPS, settings.lead_s);
+        let time = Timeline::new(settings.drive.clock, COMPARE_STEPS, settings.lead_s);
         let speeds = plant.motors.each_ref().map(|motor| motor.speed_rpm());
         let fault_s = settings.injection.map(|injection| settings.lead_s + injection.at_s);
         Self {
@@ -87,8 +87,8 @@ impl Bench {
             spoiler: Spoiler::new(settings.injection),
             course: Course::default(),
             begun: 0,
-            period: time.of_ticks(settings.carrier_ticks),
-            next: Some(PlayedPeriod::off(settings.carrier_ticks / 2 * COMPARE_STEPS)),
+            period: time.of_ticks(settings.drive.carrier_ticks),
+            next: Some(PlayedPeriod::off(settings.drive.carrier_ticks / 2 * COMPARE_STEPS)),
             toggles: Vec::with_capacity(36),
             gates: Gates::new(time.steps(settings.dead_time_s), settings.edges.then_some(time.lead)),
             off: false,
@@ -109,7 +109,7 @@ impl Bench {
     /// The same with a line side, if there is one: the network is empty, behind open contactors, and the drive has an operator.
     pub fn with_line(mut self, times: Option<LineTimes>) -> Self {
         if let Some(times) = times {
-            self.line = Some(LineSide::new(times, &self.settings.clock));
+            self.line = Some(LineSide::new(times, &self.settings.drive.clock));
             self.plant.network = NetworkState::even(0.0, LineSide::EMPTY_V);
         }
         self

@@ -3,16 +3,14 @@
 use crate::bench::{Flaws, Limits};
 use crate::inject::Injection;
 use crate::inject::zs9::Kind;
+use tractive::drive::dual::Settings;
 use tractive::nine_switch::Scheme;
-use tractive::time::Clock;
 
 /// Fixed properties of a bench.
 #[derive(Clone, Copy, Debug)]
 pub struct BenchSettings {
-    /// The firmware's clock.
-    pub clock: Clock,
-    /// Carrier period, in ticks.
-    pub carrier_ticks: u32,
+    /// The drive's, without a dead time.
+    pub drive: Settings,
     /// Before the recording, in s.
     pub lead_s: f64,
     /// Length of the recording, in s.
