@@ -1,6 +1,7 @@
 //! The experiment on machines that it has not seen.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::LazyLock;
 use tractive_control::control::{
     AimInput, Boundary, Committed, ControlLaw, Demand, Gains, Law, ModeLimits, Regulated, RotorSample,
 };
@@ -28,10 +29,10 @@ struct Plant {
     sensors: Sensors,
 }
 
-/// The flaws of the sensors, and the inertia, in kg·m²; without one the folder's.
+/// The flaws of the sensors, and how many times the inertia of its rotor the machine has.
 #[derive(Clone, Copy)]
 struct Sensors {
-    inertia_kg_m2: Option<f64>,
+    heavier: f64,
     noise_share: f32,
     /// Error of the angle's zero, electrical, in degrees.
     zero_deg: f64,
@@ -39,19 +40,18 @@ struct Sensors {
     reads: fn(Abc) -> Abc,
 }
 
-const HEALTHY: Sensors =
-    Sensors { inertia_kg_m2: None, noise_share: 0.002, zero_deg: 0.0, reads: |read| read };
+const HEALTHY: Sensors = Sensors { heavier: 1.0, noise_share: 0.002, zero_deg: 0.0, reads: |read| read };
 
 impl Plant {
     /// A machine at rest.
-    fn of(folder: &MachineFolder, flux_scale: f64, sensors: Sensors) -> Self {
-        let parameters = &folder.parameters;
+    fn of(machine: &Machine, flux_scale: f64, sensors: Sensors) -> Self {
+        let parameters = &machine.folder.parameters;
         Self {
-            map: SmoothMap::new(&folder.map),
+            map: SmoothMap::new(&machine.folder.map),
             flux_scale,
             resistance_ohm: 1.1 * parameters.stator_resistance_ohm,
             pole_pairs: parameters.pole_pairs.into(),
-            inertia_kg_m2: sensors.inertia_kg_m2.unwrap_or(parameters.rotor_inertia_kg_m2),
+            inertia_kg_m2: sensors.heavier * machine.inertia_kg_m2,
             current: (0.0, 0.0),
             angle: 0.3,
             speed: 0.0,
@@ -120,22 +120,22 @@ struct Outcome {
 /// The limits that the experiment runs within.
 const LIMITS: ModeLimits = ModeLimits::carrier(0.906);
 
-fn run(machine: &str, flux_scale: f64, sensors: Sensors) -> Outcome {
-    let folder = MachineFolder::read(&tables(machine)).unwrap();
-    let (tables, parameters) = (folder.tables(), &folder.parameters);
+fn run(machine: &Machine, flux_scale: f64, sensors: Sensors) -> Outcome {
+    let Machine { folder, tables, .. } = machine;
+    let parameters = &folder.parameters;
     let half_s = 0.5 / parameters.max_switching_hz;
     let clock = Clock::new(25_000_000, 2_500);
-    let law = Law { gains: &Gains::DEFAULT, clock: &clock, tables: &tables };
-    let mut plant = Plant::of(&folder, flux_scale, sensors);
+    let law = Law { gains: &Gains::DEFAULT, clock: &clock, tables };
+    let mut plant = Plant::of(machine, flux_scale, sensors);
     let mut identification = Identification::new();
     let noise_a = sensors.noise_share * tables.ratings.max_current_a;
     let mut committed_v = AlphaBeta::default();
     let mut outcome = Outcome { peak: 0.0, turned_deg: 0.0, pulses_s: 0.0, observations: Vec::new() };
     let mut volt_seconds = None;
     for _ in 0..16_000 {
-        let sample = plant.sample(noise_a, &tables);
+        let sample = plant.sample(noise_a, tables);
         identification.track(plant.angle(sensors.zero_deg), &Clock { control_s: half_s as f32, ..clock });
-        identification.observe(&sample, &tables);
+        identification.observe(&sample, tables);
         identification.learn(
             &Boundary { volt_seconds, length_s: half_s as f32 },
             &sample,
@@ -171,16 +171,6 @@ fn run(machine: &str, flux_scale: f64, sensors: Sensors) -> Outcome {
     outcome
 }
 
-/// Largest current of a machine, in A.
-fn parameters_bound(machine: &str) -> f64 {
-    MachineFolder::read(&tables(machine)).unwrap().parameters.max_current_a
-}
-
-/// A machine's folder.
-fn tables(machine: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables").join(machine)
-}
-
 /// The reach of the pulses along q, to one side at least, as the map is even: in the band along d where it is least, as a share of the
 /// circle that the boundaries keep to.
 fn reach(observations: &[Observation], bound_a: f64) -> f64 {
@@ -195,9 +185,23 @@ fn reach(observations: &[Observation], bound_a: f64) -> f64 {
     (-9..=1).map(of_band).fold(1.0, f64::min)
 }
 
-/// The machines, with the inertia in kg·m² of a rotor that is not the folder's.
-const MACHINES: [(&str, Option<f64>); 3] =
-    [("pmasynrm-180kw", Some(3.0)), ("pmsm-48v-1kw", None), ("ipm-zs9", None)];
+/// A machine, with the inertia of its rotor, in kg·m².
+struct Machine {
+    name: &'static str,
+    inertia_kg_m2: f64,
+    folder: MachineFolder,
+    tables: Tables,
+}
+
+/// The machines, one with a rotor that is not the folder's.
+static MACHINES: LazyLock<[Machine; 3]> = LazyLock::new(|| {
+    [("pmasynrm-180kw", Some(3.0)), ("pmsm-48v-1kw", None), ("ipm-zs9", None)].map(|(name, inertia_kg_m2)| {
+        let folder =
+            MachineFolder::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables").join(name)).unwrap();
+        let inertia_kg_m2 = inertia_kg_m2.unwrap_or(folder.parameters.rotor_inertia_kg_m2);
+        Machine { name, inertia_kg_m2, tables: folder.tables(), folder }
+    })
+});
 
 /// An experiment that came to its end within its limits.
 fn keeps_its_limits(outcome: &Outcome, case: &str) {
@@ -213,12 +217,12 @@ fn keeps_its_limits(outcome: &Outcome, case: &str) {
 
 #[test]
 fn the_current_keeps_to_its_bound_and_the_rotor_to_its_place() {
-    for (machine, inertia_kg_m2) in MACHINES {
+    for machine in &*MACHINES {
         for scale in [1.0, 0.8, 1.3] {
-            let outcome = run(machine, scale, Sensors { inertia_kg_m2, ..HEALTHY });
-            let case = format!("{machine}, flux x {scale}");
+            let outcome = run(machine, scale, HEALTHY);
+            let case = format!("{}, flux x {scale}", machine.name);
             keeps_its_limits(&outcome, &case);
-            let reached = reach(&outcome.observations, parameters_bound(machine));
+            let reached = reach(&outcome.observations, machine.folder.parameters.max_current_a);
             println!("{case}: the plane up to {reached:.3} of the circle");
             assert!(reached > 0.8, "{case}: {reached}");
         }
@@ -228,14 +232,15 @@ fn the_current_keeps_to_its_bound_and_the_rotor_to_its_place() {
 /// Currents along what the angle says is d turn such a rotor: it is taken back.
 #[test]
 fn a_free_rotor_keeps_its_place_where_the_angles_zero_is_off() {
-    for (machine, inertia_kg_m2) in MACHINES {
-        let folder = MachineFolder::read(&tables(machine)).unwrap().parameters.rotor_inertia_kg_m2;
+    for machine in &*MACHINES {
         for (zero_deg, heavier) in
             [(-10.0, 1.0), (-10.0, 3.0), (-3.0, 1.0), (3.0, 1.0), (10.0, 1.0), (10.0, 3.0)]
         {
-            let inertia_kg_m2 = Some(heavier * inertia_kg_m2.unwrap_or(folder));
-            let outcome = run(machine, 1.0, Sensors { inertia_kg_m2, zero_deg, ..HEALTHY });
-            keeps_its_limits(&outcome, &format!("{machine}, {zero_deg}°, {heavier} times the inertia"));
+            let outcome = run(machine, 1.0, Sensors { heavier, zero_deg, ..HEALTHY });
+            keeps_its_limits(
+                &outcome,
+                &format!("{}, {zero_deg}°, {heavier} times the inertia", machine.name),
+            );
         }
     }
 }
@@ -251,14 +256,13 @@ fn currents_that_answer_against_the_voltage_end_the_experiment() {
         ("two others exchanged", |Abc { a, b, c }| Abc { a: b, b: a, c }),
         ("one after the other", |Abc { a, b, c }| Abc { a: b, b: c, c: a }),
     ];
-    for (machine, inertia_kg_m2) in MACHINES {
+    for machine @ Machine { name, .. } in &*MACHINES {
         for (case, reads) in wrong {
-            let Outcome { peak, observations, .. } =
-                run(machine, 1.0, Sensors { inertia_kg_m2, reads, ..HEALTHY });
-            println!("{machine}, {case}: |i| up to {peak:.3} of the bound");
+            let Outcome { peak, observations, .. } = run(machine, 1.0, Sensors { reads, ..HEALTHY });
+            println!("{name}, {case}: |i| up to {peak:.3} of the bound");
             let past = observations.iter().any(|o| !matches!(o.stage, Stage::Probe | Stage::Done));
-            assert!(!past && peak < 0.3, "{machine}, {case}: {peak}");
-            assert_eq!(observations.last().map(|o| o.stage), Some(Stage::Done), "{machine}, {case}");
+            assert!(!past && peak < 0.3, "{name}, {case}: {peak}");
+            assert_eq!(observations.last().map(|o| o.stage), Some(Stage::Done), "{name}, {case}");
         }
     }
 }

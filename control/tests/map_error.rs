@@ -1,6 +1,7 @@
 //! The difference of machine and link from what they are taken for: found by the control law in front of such a machine, and made use of.
 
 use std::path::Path;
+use std::sync::LazyLock;
 use tractive_control::control::{
     AimInput, Boundary, ControlLaw, Controller, DeadTime, Demand, Gains, Law, ModeLimits, Regulated,
     RotorSample, Warmth, flux_linkage, torque_nm,
@@ -27,10 +28,16 @@ impl Off {
     }
 }
 
+/// The machine as it is rated.
+static TABLES: LazyLock<Tables> = LazyLock::new(|| {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");
+    MachineFolder::read(&folder).unwrap().tables()
+});
+
 /// A drive in front of a machine that has whatever current is aimed at.
 struct Run {
     law: Controller,
-    tables: Tables,
+    tables: &'static Tables,
     clock: Clock,
     off: Off,
     warmth: Warmth,
@@ -47,14 +54,12 @@ const LIMITS: ModeLimits = ModeLimits::carrier(1.0);
 
 impl Run {
     fn new(off: Off) -> Self {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");
-        let tables = MachineFolder::read(&folder).unwrap().tables();
         let clock = Clock::new(25_000_000, 2_500);
         let (law, warmth, dead) =
             (Controller::new(), Warmth::NONE, DeadTime { voltage_v: 0.0, left_share: 0.2, time_s: 0.0 });
         Self {
             law,
-            tables,
+            tables: &TABLES,
             clock,
             off,
             warmth,
@@ -70,14 +75,14 @@ impl Run {
     /// So many seconds at a speed in rad/s with a torque in N·m asked for; a carrier half is five control periods.
     fn drive(&mut self, omega: f32, torque_nm: f32, seconds: f32) {
         let demand = Demand { torque_nm, slew_limited: true };
-        let constants = Law { gains: &Gains::DEFAULT, clock: &self.clock, tables: &self.tables };
+        let constants = Law { gains: &Gains::DEFAULT, clock: &self.clock, tables: self.tables };
         for _ in 0..(seconds * 1e4) as u32 {
             self.turned += f64::from(omega) * 1e-4 / std::f64::consts::TAU;
             let angle = Angle::from_turns(self.turned.rem_euclid(1.0) as f32);
             self.law.track(angle, &self.clock);
             let current = self.law.target().current;
-            let sample = RotorSample::new(current.unpark(angle.sin_cos()).abc(), angle, &self.tables);
-            self.law.observe(&sample, &self.tables);
+            let sample = RotorSample::new(current.unpark(angle.sin_cos()).abc(), angle, self.tables);
+            self.law.observe(&sample, self.tables);
             self.period += 1;
             if self.period.is_multiple_of(5) {
                 let there = self.off.flux(sample.flux).unpark(sample.frame);
@@ -104,7 +109,7 @@ impl Run {
     /// The machine's torque, in N·m.
     fn torque_nm(&self) -> f32 {
         let current = self.law.target().current;
-        torque_nm(&self.tables, self.off.flux(flux_linkage(&self.tables, current)), current)
+        torque_nm(self.tables, self.off.flux(flux_linkage(self.tables, current)), current)
     }
 
     /// By how much the torque that is told is off, as a share of the largest.
@@ -313,11 +318,11 @@ fn a_voltage_that_is_hardly_likely_teaches_no_more_than_one_that_is() {
 fn nothing_that_is_no_number_stays() {
     let mut run = driven(AS_RATED, 300.0, 900.0);
     let (seen, constants) =
-        (run.law.map_error(), Law { gains: &Gains::DEFAULT, clock: &run.clock, tables: &run.tables });
+        (run.law.map_error(), Law { gains: &Gains::DEFAULT, clock: &run.clock, tables: run.tables });
     let sample = RotorSample::new(
         run.law.target().current.unpark(Angle::ZERO.sin_cos()).abc(),
         Angle::ZERO,
-        &run.tables,
+        run.tables,
     );
     for volts in [f32::NAN, f32::INFINITY] {
         let volt_seconds = Some(AlphaBeta { alpha: volts, beta: volts });

@@ -14,18 +14,18 @@ use std::path::Path;
 use tractive::protocol::{Frame, Scales};
 use tractive_rig::talk::{Listener, System};
 
-/// The drive that is disturbed.
+/// The drive that is disturbed, each command as soon as the one before has had its effect.
 const SCRIPT: &str = "\
-0.20 charge
-0.50 enable
-0.55 torque 300 over 0.05
+0.10 charge
+0.26 enable
+0.31 torque 300 over 0.05
 3.00 end
 ";
-/// The same of the ZS9, whose network charges more slowly.
+/// The same of the ZS9.
 const SCRIPT_ZS9: &str = "\
-0.20 charge
-0.70 enable
-1.00 torque 20 20 over 0.05
+0.10 charge
+0.26 enable
+0.31 torque 20 20 over 0.05
 3.00 end
 ";
 /// The frames that are shown.
@@ -60,16 +60,13 @@ pub enum When {
 }
 
 impl When {
-    fn instant(self, system: System) -> Time {
-        let ms = match (self, system) {
-            (Self::Starting(at), _) => return at,
-            (Self::Ready, _) => 190,
-            (Self::Charged, System::Pmasynrm) => 480,
-            (Self::Charged, System::Zs9) => 680,
-            (Self::Enabled, System::Pmasynrm) => 540,
-            (Self::Enabled, System::Zs9) => 980,
-            (Self::Running, System::Pmasynrm) => 750,
-            (Self::Running, System::Zs9) => 1_150,
+    fn instant(self) -> Time {
+        let ms = match self {
+            Self::Starting(at) => return at,
+            Self::Ready => 95,
+            Self::Charged => 250,
+            Self::Enabled => 300,
+            Self::Running => 510,
         };
         // Not at a control interrupt.
         ms * MILLISECOND + MILLISECOND / 30
@@ -124,6 +121,8 @@ pub struct Seen {
     pub off_after: Option<Time>,
     /// The same of contactors, discharge resistor and chopper.
     pub lines_off_after: Option<Time>,
+    /// The state as told just before.
+    pub state: String,
     /// Gates were on just before.
     pub pulsed: bool,
     /// The timers had their clocks just before; without them pins float as from the reset on, and what switches off does nothing.
@@ -172,10 +171,11 @@ pub fn starting(image: &Path, system: System) -> Result<Vec<Time>> {
 pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Seen> {
     let mut cpu = drive(image, system)?;
     cpu.machine_mut().world.side.charge();
-    cpu.run(when.instant(system))?;
+    cpu.run(when.instant())?;
     let machine = cpu.machine();
     ensure!(machine.findings.all.is_empty(), "{}", machine.findings.all[0]);
     let (from, pulsed) = (machine.now(), machine.world.any_gate());
+    let state = machine.world.talk.listener.value("state");
     let clocked = machine.chip.rcc.word(APB2ENR) != 0;
     let before = [machine.world.edges.len(), machine.world.line_edges.len()];
     let after = if matches!(when, When::Starting(_)) { AFTER_STARTING } else { AFTER };
@@ -196,6 +196,7 @@ pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Se
     Ok(Seen {
         off_after: (!world.any_gate()).then(|| last(&world.edges[gates..])),
         lines_off_after: (!world.any_line()).then(|| last(&world.line_edges[lines..])),
+        state,
         pulsed,
         clocked,
         heard: world.talk.received - received,

@@ -36,6 +36,9 @@ struct Arguments {
     /// Holds the gates' edges against those that the drive makes on the host of the same inputs.
     #[arg(long)]
     host: bool,
+    /// Counts the waits for the flash memory; takes a quarter longer.
+    #[arg(long)]
+    waits: bool,
     /// Lists every access to a peripheral: instant in µs, exception, access.
     #[arg(long, conflicts_with = "host")]
     record: bool,
@@ -58,7 +61,9 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<bool> {
     let settings = Settings::of_file(&arguments.image, arguments.system, &arguments.script)?;
     let (mut cpu, image) = prepare(&settings)?;
-    cpu.count_waits()?;
+    if arguments.waits {
+        cpu.count_waits()?;
+    }
     println!("image {} SHA-256 {}", arguments.image.display(), image.sha256);
     let instant = |at_s: f64| (at_s * SECOND as f64) as Time;
     cpu.machine_mut().world.drops = arguments.drivers_fail.map(instant);
@@ -120,10 +125,13 @@ fn tell_instants(cpu: &Cpu) {
     for (exception, longest) in &cpu.longest {
         let late = machine.nvic.waited(*exception) / machine.cycle();
         let Longest { cycles, prefetched, waited } = longest;
-        println!(
-            "{}: {cycles} cycles at most, {prefetched} with the flash memory's prefetch alone, {waited} with all of its wait states; it waited for {late} at most",
-            interrupt(*exception)
-        );
+        print!("{}: {cycles} cycles at most, ", interrupt(*exception));
+        if machine.waits.is_some() {
+            print!(
+                "{prefetched} with the flash memory's prefetch alone, {waited} with all of its wait states, "
+            );
+        }
+        println!("it waited for {late} at most");
     }
     for adc in &machine.chip.adcs {
         let instants = Instants::of(adc.name(), &adc.samplings, &machine.world.edges);

@@ -15,27 +15,27 @@ pub type Change = fn(u32, u32) -> u32;
 
 /// The drive.
 const SCRIPT: &str = "\
-0.20 expect state ready
-0.20 charge
-0.50 expect state charged
-0.50 enable
-0.55 expect state enabled
-0.55 torque 300 over 0.05
-0.90 expect state running
+0.10 expect state ready
+0.10 charge
+0.26 expect state charged
+0.26 enable
+0.31 expect state enabled
+0.31 torque 300 over 0.05
+0.66 expect state running
      expect torque_nm 300 within 15
      expect speed_rpm 84.5 within 2
      expect mode async
      expect fault none
-0.90 end
+0.66 end
 ";
 /// The drive for what shows only where the carrier's halves differ: until a synchronous mode runs.
 const SYNCHRONOUS: &str = "\
-0.20 charge
-0.50 enable
-0.55 torque 1235 over 0.1
-1.40 expect mode sync15
+0.10 charge
+0.26 enable
+0.31 torque 1235 over 0.1
+1.16 expect mode sync15
      expect fault none
-1.40 end
+1.16 end
 ";
 /// The time from the cause of a break until every gate must be off.
 const BREAK: u64 = MICROSECOND;

@@ -13,20 +13,20 @@ use tractive_twin::time::{MILLISECOND, SECOND, Time};
 
 /// Charged at once, enabled, pulling.
 const SCRIPT: &str = "\
-0.20 charge
-0.50 enable
-0.55 torque 300 over 0.05
-0.90 expect state running
+0.10 charge
+0.26 enable
+0.31 torque 300 over 0.05
+0.66 expect state running
      expect fault none
-0.90 end
+0.66 end
 ";
 const SCRIPT_ZS9: &str = "\
-0.20 charge
-0.70 enable
-1.00 torque 20 -20 over 0.05
-1.20 expect state running
+0.10 charge
+0.26 enable
+0.56 torque 20 -20 over 0.05
+0.76 expect state running
      expect fault none
-1.20 end
+0.76 end
 ";
 /// A cycle of the core.
 const CYCLE: Time = SECOND / 170_000_000;
@@ -98,7 +98,7 @@ fn interrupts_are_in_time(cpu: &Cpu, deadlines: &[(usize, u64)]) {
 #[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
 fn the_pmasynrm_s_image_is_in_order() {
     let (cpu, image) = driven(System::Pmasynrm, None);
-    nothing_is_driven_before(&cpu, 200 * MILLISECOND, 500 * MILLISECOND);
+    nothing_is_driven_before(&cpu, 100 * MILLISECOND, 260 * MILLISECOND);
     the_stack_suffices(&cpu, &image);
     // Control until its next call, the PWM's until the next boundary: half a carrier period at 900 Hz.
     interrupts_are_in_time(&cpu, &[(CONTROL, 17_000), (PWM, 94_000)]);
@@ -117,7 +117,7 @@ fn the_pmasynrm_s_image_is_in_order() {
 #[ignore = "needs the image; `cargo xtask test --only twin` builds it"]
 fn the_zs9_s_image_is_in_order() {
     let (cpu, image) = driven(System::Zs9, None);
-    nothing_is_driven_before(&cpu, 200 * MILLISECOND, 700 * MILLISECOND);
+    nothing_is_driven_before(&cpu, 100 * MILLISECOND, 260 * MILLISECOND);
     the_stack_suffices(&cpu, &image);
     // Both until the carrier's next valley or peak.
     interrupts_are_in_time(&cpu, &[(CONTROL_ZS9, 8_500), (PWM, 8_500)]);

@@ -98,7 +98,8 @@ fn campaign(system: System, cases: impl IntoIterator<Item = (Cause, When)>) {
         };
         let off = is_within(within(cause), seen.off_after)
             && is_within(lines_within(cause, when), seen.lines_off_after);
-        let pulsed = seen.pulsed == matches!(when, When::Enabled | When::Running);
+        let pulsed = seen.pulsed == matches!(when, When::Enabled | When::Running)
+            && (matches!(when, When::Starting(_)) || seen.state == format!("{when:?}").to_lowercase());
         let is_early = matches!(when, When::Starting(_)) && !seen.clocked;
         let early = |text: &String| is_early && text.ends_with("its clock is off");
         let quiet = seen.findings.iter().all(early);

@@ -12,19 +12,19 @@ use tractive_twin::time::{SECOND, Time};
 
 /// A short pull, from standstill.
 const SCRIPT: &str = "\
-0.20 charge
-0.50 enable
-0.55 torque 300 over 0.05
-0.65 expect mode async
-0.65 end
+0.10 charge
+0.26 enable
+0.31 torque 300 over 0.05
+0.41 expect mode async
+0.41 end
 ";
 /// The same of both motors.
 const SCRIPT_ZS9: &str = "\
-0.20 charge
-0.70 enable
-1.00 torque 20 -20 over 0.02
-1.10 expect state running
-1.10 end
+0.10 charge
+0.26 enable
+0.56 torque 20 -20 over 0.02
+0.66 expect state running
+0.66 end
 ";
 
 /// The first compare of leg U: TIM1_CCR1; and the compare at which M of leg V goes on again: TIM8_CCR4.

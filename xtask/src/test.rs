@@ -14,52 +14,36 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+/// Parts that packages are tested in: words behind `cargo test`.
+type Parts = &'static [&'static str];
+
 /// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
 /// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the
 /// first.
-const TOGETHER: [&[&str]; 6] = [
-    &[
-        "tractive",
-        "tractive-control",
-        "tractive-tablegen",
-        "tractive-bench",
-        "tractive-cells",
-        "tractive-fault-injector",
-        "tractive-mutants",
-    ],
-    &[CONTROL],
-    &[DRIVE],
-    &[TABLEGEN],
-    &[RIG],
-    &[OWN],
+const TOGETHER: [(&str, Parts); 4] = [
+    (
+        "tractive tractive-control tractive-tablegen tractive-bench tractive-cells tractive-fault-injector tractive-mutants",
+        // With the optimised patterns, too, what they are for: as features they are else in the rig's dependencies alone.
+        &[
+            "",
+            "--features tractive/optimal,tractive-tablegen/patterns --test pinned --test pulses --test patterns --test values",
+            "--features tractive/optimal,tractive-tablegen/patterns --test proofs compare_values",
+        ],
+    ),
+    // The unit tests of that, which are only of these two.
+    (
+        ONCE_MORE,
+        &["--features tractive-control/optimal,tractive-tablegen/patterns --lib -- modulation patterns"],
+    ),
+    // The rig's own unit tests take a second, but all of it compiled once more: that is done without optimisation. The others take the library
+    // that `cargo rig` runs.
+    (
+        "tractive-rig",
+        &["--lib --config profile.release.package.tractive-rig.opt-level=0", "--bins --test *", "--doc"],
+    ),
+    ("xtask", &[""]),
 ];
-
-/// The tests of the optimised patterns, which no other command builds in: the rig has them in its dependencies alone.
-const CONTROL: &str = "tractive-control";
-const CONTROL_PARTS: [&[&str]; 2] =
-    [&["--lib", "--features", "optimal", "modulation"], &["--test", "pulses", "--features", "optimal"]];
-const TABLEGEN: &str = "tractive-tablegen";
-const TABLEGEN_PARTS: [&[&str]; 1] =
-    [&["--lib", "--test", "patterns", "--test", "values", "--features", "patterns"]];
-const DRIVE: &str = "tractive";
-const DRIVE_PARTS: [&[&str]; 2] = [
-    &["--test", "pinned", "--features", "optimal"],
-    &["--test", "proofs", "--features", "optimal", "compare_values"],
-];
-
-/// The rig, and the parts that it is tested in. Its own unit tests take a second, but all of it compiled once more: that is done without
-/// optimisation. The others take the library that `cargo rig` runs.
-const RIG: &str = "tractive-rig";
-const RIG_PARTS: [&[&str]; 3] = [
-    &["--lib", "--config", "profile.release.package.tractive-rig.opt-level=0"],
-    &["--bins", "--test", "*"],
-    &["--doc"],
-];
-
-/// This program, likewise.
-const OWN: &str = "xtask";
-const OWN_PARTS: [&[&str]; 2] =
-    [&["--bins", "--config", "profile.release.package.xtask.opt-level=0"], &["--test", "*"]];
+const ONCE_MORE: &str = "tractive-control tractive-tablegen";
 
 /// Settings of the C library (glibc; others do not heed them) that keep the memory that a program frees for its next use. A recording has many megabytes, and for
 /// each the system would have to make every page anew.
@@ -142,7 +126,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
             let mut command = cargo_with("doc --release --no-deps --workspace --exclude");
             succeeds(command.arg(twin::PACKAGE).env("RUSTDOCFLAGS", "-D warnings"))?
         }
-        Step::Host => all(together()?, |packages| host(&packages))?,
+        Step::Host => all(together()?, |(packages, parts)| host(&packages, parts))?,
         Step::Loom => {
             let mut command = cargo_with("test --profile loom --package tractive-cells --test interleavings");
             succeeds(command.env("RUSTFLAGS", "--cfg loom"))?
@@ -180,20 +164,12 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
     Ok(good.into())
 }
 
-/// The tests of packages on this machine.
-fn host(packages: &[String]) -> Result<bool> {
-    let named = packages.iter().flat_map(|package| ["--package", package.as_str()]);
-    let parts: &[&[&str]] = match packages {
-        [package] if package == CONTROL => &CONTROL_PARTS,
-        [package] if package == TABLEGEN => &TABLEGEN_PARTS,
-        [package] if package == DRIVE => &DRIVE_PARTS,
-        [package] if package == RIG => &RIG_PARTS,
-        [package] if package == OWN => &OWN_PARTS,
-        _ => &[&[]],
-    };
+/// The tests of packages on this machine, part by part.
+fn host(packages: &str, parts: Parts) -> Result<bool> {
+    let named = packages.split(' ').flat_map(|package| ["--package", package]);
     all(parts, |part| {
-        let mut command = cargo();
-        command.args(["test", "--release"]).args(named.clone()).args(*part);
+        let mut command = cargo_with("test --release");
+        command.args(named.clone()).args(part.split_whitespace());
         succeeds(command.envs(MEMORY_KEPT))
     })
 }
@@ -291,12 +267,10 @@ fn on_target() -> Result<Vec<(String, &'static [&'static str])>> {
 }
 
 /// [`TOGETHER`], with the boards.
-fn together() -> Result<Vec<Vec<String>>> {
-    let mut groups =
-        TOGETHER.map(|group| group.iter().map(|package| (*package).to_owned()).collect::<Vec<_>>());
-    let boards = Board::all()?.into_iter().map(|board| board.package);
-    groups[0].extend(boards);
-    Ok(groups.into())
+fn together() -> Result<[(String, Parts); 4]> {
+    let mut groups = TOGETHER.map(|(packages, parts)| (packages.to_owned(), parts));
+    Board::all()?.iter().for_each(|board| groups[0].0 += &format!(" {}", board.package));
+    Ok(groups)
 }
 
 fn lint(command: &mut Command, what: &[&str]) -> Result<bool> {
@@ -368,15 +342,11 @@ mod tests {
         let metadata: serde_json::Value = serde_json::from_slice(&metadata.stdout).unwrap();
         let packages = metadata["packages"].as_array().unwrap();
         let mut there: Vec<_> = packages.iter().map(|package| package["name"].as_str().unwrap()).collect();
-        // Some have a part more, with the optimised patterns.
-        let (once_more, groups): (Vec<_>, Vec<_>) = together()
-            .unwrap()
-            .into_iter()
-            .partition(|packages| matches!(&packages[..], [package] if [CONTROL, DRIVE, TABLEGEN].contains(&package.as_str())));
-        assert_eq!(once_more.len(), 3);
-        let mut tested = groups.concat();
+        let groups = together().unwrap().map(|(packages, _)| packages);
+        let once = groups.iter().filter(|packages| *packages != ONCE_MORE);
+        let mut tested: Vec<_> = once.flat_map(|packages| packages.split(' ')).collect();
         // Step `twin` tests it, where there is cmake.
-        tested.push(twin::PACKAGE.to_owned());
+        tested.push(twin::PACKAGE);
         there.sort_unstable();
         tested.sort_unstable();
         assert_eq!(tested, there);

@@ -32,7 +32,7 @@ pub fn run(args: &TwinArgs) -> Result<u8> {
     let script = script(args.scenario.as_deref().unwrap_or(Path::new(SCENARIO)), args.system)?;
     let image = image(&mut setup, args.system)?;
     let out = args.out.clone().unwrap_or_else(|| root().join(OUT));
-    Ok(u8::from(!succeeds(&mut drive(&image, args.system, &script, &out))?))
+    Ok(u8::from(!succeeds(drive(&image, args.system, &script, &out).arg("--waits"))?))
 }
 
 /// The script of a scenario's name, or of a path. The error names those that there are.
