@@ -68,6 +68,16 @@ fn a_machine_of_reluctance_alone_keeps_its_torque() {
     );
 }
 
+/// A machine of much reluctance whose line is lost just after a switch to three pulses: its torque goes within some milliseconds, and the pulses' ripple at so little
+/// voltage, while they waited for 30 ms to have passed, was beyond its trip level.
+#[test]
+fn a_pattern_that_has_just_begun_gives_way_where_torque_goes() {
+    keeps_its_bounds(
+        "--pole-pairs 3 --rs 0.08 --ld 1.2e-3 --lq 9e-3 --psi-f 0.2 --saturation 0.6 --max-current 240 --udc 750 --max-speed-rpm 5000 --max-switching-hz 1000",
+        &[("gaps", 11)],
+    );
+}
+
 /// A machine whose patterns have halves down to 0.36 of a control period goes through all five modes to 2 kHz of stator frequency: which half leads the flux to
 /// a pattern the modulator alone knows. Led by control it tripped where the first pattern began, and, counted as if its command were for the next half, in square wave.
 #[test]

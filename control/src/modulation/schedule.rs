@@ -6,9 +6,7 @@
 
 use super::mode::{Regulation, Row};
 use super::{Mode, Reference, SwitchLimits};
-#[cfg(feature = "optimal")]
-use crate::frames::six_step_v;
-use crate::frames::{Angle, UNITS_PER_RADIAN};
+use crate::frames::{Angle, UNITS_PER_RADIAN, six_step_v};
 use crate::time::{Clock, Instant};
 
 /// The border at which a mode gives way to the next one up. Frequencies are shares of the highest switching frequency; each of the pair
@@ -84,6 +82,10 @@ const INDEX_HYSTERESIS: f32 = 0.012;
 
 /// Shortest time between two switches of mode, in s.
 const DWELL_S: f32 = 0.03;
+
+/// Share of six-step below which a middle-60° pattern does not wait for that time: made of little but notches, three pulses leave more current there than the
+/// machine has at full torque. A machine of reluctance whose line was lost just after a switch to them, and its torque with it, tripped.
+const PATTERN_WAITS: f32 = 0.75;
 
 /// The choice of mode.
 #[derive(Clone, Copy, Debug)]
@@ -188,7 +190,7 @@ impl Schedule {
         if let Some(last) = self.last_switch
             && mode != Mode::Off
         {
-            if (0..self.dwell_ticks).contains(&now.since(last)) {
+            if !self.is_low(mode, seen) && (0..self.dwell_ticks).contains(&now.since(last)) {
                 return mode;
             }
             self.last_switch = None;
@@ -231,6 +233,15 @@ impl Schedule {
             wanted = *below;
         }
         wanted
+    }
+
+    /// `true` if a middle-60° pattern of the ladder makes so little voltage that its dwell time does not count. One that only catches a machine for optimised
+    /// patterns stays.
+    #[inline(always)]
+    fn is_low(&self, mode: Mode, seen: &Reference) -> bool {
+        mode.is_pattern()
+            && seen.voltage_v < PATTERN_WAITS * six_step_v(seen.udc_v)
+            && self.ladder.0.contains(&mode)
     }
 
     /// Tells the schedule that the mode changed at this instant.
