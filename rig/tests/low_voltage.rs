@@ -88,6 +88,16 @@ fn a_machine_at_its_largest_current_leaves_square_wave_without_a_jump() {
     );
 }
 
+/// A machine that weakens where its free carrier ends: patterns have no more than its voltage there, and open above. A free carrier took over from square wave with 93 of
+/// 739 N·m too little for 5 ms, on the way up seven pulses from locked ones with 3.3 % of current too much; with optimised patterns 34 N·m were too much.
+#[test]
+fn a_free_carrier_and_patterns_take_over_where_both_have_the_same_voltage() {
+    keeps_its_bounds(
+        "--pole-pairs 4 --rs 0.03 --ld 0.9e-3 --lq 1.9e-3 --psi-f 0.28 --saturation 0.8 --max-current 350 --udc 600 --max-speed-rpm 4500 --max-switching-hz 3000",
+        &[("sweep --to 2300 --down", 5), ("sweep --to 2300 --down --patterns optimal", 5)],
+    );
+}
+
 /// A machine whose patterns have halves down to 0.36 of a control period goes through all five modes to 2 kHz of stator frequency: which half leads the flux to
 /// a pattern the modulator alone knows. Led by control it tripped where the first pattern began, and, counted as if its command were for the next half, in square wave.
 #[test]
