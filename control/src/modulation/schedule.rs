@@ -314,17 +314,16 @@ pub fn index_floor(rate: f32, devices: &SwitchLimits) -> f32 {
     (frequency_share(rate.abs(), devices) - FROM_SHARE) * (1.0 / OVER_SHARE)
 }
 
-/// The fundamental that a pattern should have at most, as a share of six-step, with `rate` in angle units per tick: it falls to the free carrier's just before
-/// that takes over on the way down, and rises from there on the way up, as a carrier has no more. Without it a machine that weakens there, one of
-/// 600 V and 3 kHz, lost 93 of 739 N·m for 5 ms when a free carrier took over from square wave.
+/// The fundamental that a pattern should have at most, as a share of six-step, with `rate` in angle units per tick: between the two frequencies of the free carrier's
+/// border it falls from the whole to the carrier's, so that the free carrier finds the flux linkage that it can hold. Without it a machine that weakens there,
+/// one of 600 V and 3 kHz, lost 93 of 739 N·m for 5 ms when the free carrier took over from square wave.
 #[inline(always)]
 pub fn index_ceiling(rate: f32, devices: &SwitchLimits) -> f32 {
-    /// Share of the highest switching frequency up to which it is the carrier's, a little above the border, and per share above that.
-    const FROM_SHARE: f32 = 0.0445;
-    const PER_SHARE: f32 = 15.0;
-    let beyond = frequency_share(rate.abs(), devices) - FROM_SHARE;
-    let carriers = Mode::Async.row().largest;
-    if beyond > 0.0 { carriers + PER_SHARE * beyond } else { carriers }
+    const BORDER: (f32, f32) = Mode::Async.row().until.shares;
+    const CARRIERS: f32 = Mode::Async.row().largest;
+    const PER_SHARE: f32 = (1.0 - CARRIERS) / (BORDER.0 - BORDER.1);
+    let beyond = (frequency_share(rate.abs(), devices) - BORDER.1) * PER_SHARE;
+    if beyond > 0.0 { CARRIERS + beyond } else { CARRIERS }
 }
 
 /// `true` if the carrier that ends where half number `next_half` begins may give way to `to`: a locked carrier must have
@@ -402,15 +401,13 @@ mod tests {
         }
     }
 
-    /// The ceiling of devices of 900 Hz is the carrier's up to a little above the border at which the free carrier gives way, and none from a seventh of it on.
+    /// The ceiling of devices of 900 Hz is the carrier's up to where the free one takes over on the way down, and none from where it ends on the way up.
     #[test]
-    fn the_ceiling_rises_from_40_hz_to_46() {
+    fn the_ceiling_rises_from_38_hz_to_40() {
         let clock = Clock::new(25_000_000, 2_500);
         let devices = SwitchLimits::new(250, 0, 900.0, &clock);
         let carriers = index_limit(Mode::Async, 0.0, &devices);
-        for (hz, ceiling) in
-            [(0.0, carriers), (40.0, carriers), (-40.0, carriers), (43.0, 0.956), (-46.0, 1.006)]
-        {
+        for (hz, ceiling) in [(0.0, carriers), (38.0, carriers), (39.0, 0.953), (-39.0, 0.953), (40.0, 1.0)] {
             let found = index_ceiling(clock.angle_rate(hz * core::f32::consts::TAU), &devices);
             assert!((found - ceiling).abs() < 1e-3, "{hz}: {found}");
         }
