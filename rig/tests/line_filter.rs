@@ -182,3 +182,34 @@ fn a_sweep_behind_a_line_filter_keeps_its_bounds() {
         assert!(figures.number("peak_line_current_a").unwrap() > 30.0, "{command}");
     }
 }
+
+/// A drive whose demand is beyond what the link gives damps it as well: there the torque follows the voltage limit, and that the link's swing. Where the limit
+/// followed the link by its slow value alone these swung by 6.5 and 3.1 %.
+#[test]
+fn a_demand_beyond_what_the_link_gives_is_damped() {
+    for command in [
+        "steady --machine pmsm-48v-1kw --udc 40 --speed 5500 --torque 2.38 --line 0.8,7,18",
+        "steady --machine ipm-zs9 --udc 200 --speed 1400 --torque 120 --line 1.5,8,20",
+    ] {
+        let chosen = catalogue::of_traction(command).unwrap();
+        let machine = chosen.machine().unwrap();
+        let recording = chosen.drive(&machine).unwrap();
+        let swing = swing(&recording, 1.0);
+        assert!(swing < 0.005, "{command}: {swing}");
+        let figures = chosen.figures(&recording, &machine);
+        assert!(!figures.fall_short(), "{command}: {:?}", figures.get("verdicts"));
+    }
+}
+
+/// A battery's cable swings at kilohertz, and is damped by its own resistance: the drive leaves it alone, and steps and precharge keep their bounds.
+#[test]
+fn a_batterys_cable_needs_no_damping() {
+    for command in ["load-steps", "full-step", "precharge"] {
+        let command = format!("{command} --machine pmsm-48v-1kw --line 0.005,1,25");
+        let chosen = catalogue::of_traction(&command).unwrap();
+        let machine = chosen.machine().unwrap();
+        let recording = chosen.drive(&machine).unwrap();
+        let figures = chosen.figures(&recording, &machine);
+        assert!(!figures.fall_short(), "{command}: {:?}", figures.get("verdicts"));
+    }
+}

@@ -233,7 +233,7 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
         let demand_nm = self.demand.step(&shaping, ratings);
         let link = self.link.step(udc_v * link_scale, change_v * link_scale, period_s);
         let limit = VoltageLimit {
-            udc_v: link.slow_v / flux,
+            udc_v: swing.map_or(link.slow_v, |swing| swing.udc_v * link_scale) / flux,
             modulation_index: limits.steady_limit,
             filled: limits.filled,
         };
@@ -252,7 +252,7 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
             tables,
         );
         let modulation_index = point.modulation_index
-            * swing.map_or(link.slow_v / self.link.lowest_v(), |swing| link.slow_v * swing.per_slow_v)
+            * swing.map_or(link.slow_v / self.link.lowest_v(), |swing| 1.0 + swing.share)
             - DEPTH_PER_TORQUE / ratings.max_torque_nm * more_nm;
         let limited = point.region == Region::Limit;
         let given_nm =

@@ -21,8 +21,8 @@ const SQUARE_SHARE: f32 = 0.12;
 pub struct LinkSwing {
     /// The part that is to be damped, as a share of the link's voltage.
     pub share: f32,
-    /// One over the link's slow value, in 1/V.
-    pub per_slow_v: f32,
+    /// The link with that part of its swing, in V.
+    pub udc_v: f32,
 }
 
 impl LinkSwing {
@@ -56,14 +56,13 @@ impl LinkDamper {
     #[inline(always)]
     pub fn step(&mut self, udc_v: f32, period_s: f32, omega: f32, follows: Regulated) -> LinkSwing {
         self.slow_v += SLOW_RAD_S * period_s * (udc_v - self.slow_v);
-        let per_slow_v = 1.0 / self.slow_v;
-        let share = udc_v * per_slow_v - 1.0;
+        let share = udc_v / self.slow_v - 1.0;
         self.share = if follows == Regulated::Angle {
             self.share + SQUARE_SHARE * omega.abs() * period_s * (share - self.share)
         } else {
             share
         };
-        LinkSwing { share: self.share, per_slow_v }
+        LinkSwing { share: self.share, udc_v: self.slow_v * (1.0 + self.share) }
     }
 }
 
@@ -82,7 +81,7 @@ mod tests {
             (-0.9, 200.0, 50.0, -200.0),
             (0.9, 200.0, 50.0, 100.0),
         ] {
-            let swing = LinkSwing { share, per_slow_v: 1e-3 };
+            let swing = LinkSwing { share, udc_v: 1e3 };
             let got_nm = swing.damping_nm(2.0, torque_nm, omega, 300.0);
             assert!((got_nm - more_nm).abs() < 1e-4, "{share} {torque_nm} {omega}: {got_nm}");
         }

@@ -112,7 +112,8 @@ pub(super) fn point(
     let Weakened { current, torque_nm, region, inside } =
         weakened(torque_nm, best.squared(), &Electrical { omega, voltage_v, resistance }, tables);
     let right = current.d - best.d >= MTPA_OFF * tables.ratings.max_current_a;
-    if region == Region::Weakening && (right || inside) && !limit.filled {
+    // Right of it the circle is larger than its flux linkage, and where the largest current ends on it before the torque is reached, it does so inside.
+    if !limit.filled && (right || inside && region == Region::Weakening) {
         return unweakened;
     }
     OperatingPoint { current, flux: flux_linkage(tables, current), torque_nm, region, modulation_index }

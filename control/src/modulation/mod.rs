@@ -115,5 +115,5 @@ pub use modulator::Modulator;
 pub use reference::Reference;
 use ripple::RippleFlux;
 pub use ripple::{ripple_at, ripple_share, ripple_squares};
-pub use schedule::{Ladder, Schedule, first_half, index_floor, index_limit};
+pub use schedule::{Ladder, Schedule, first_half, index_ceiling, index_floor, index_limit};
 pub use switch_limits::{FREE_CARRIER_SHARE, SwitchLimits};

@@ -2,7 +2,7 @@
 
 use super::switchgear::Held;
 use super::{Switchgear, Tick};
-use crate::plant::{DcLink, DcLinkSettings, Heat, LinkEnergies, LinkSwitches, Plant};
+use crate::plant::{DcLink, DcLinkSettings, Heat, LineFilter, LinkEnergies, LinkSwitches, Plant};
 use crate::steps::held;
 use crate::trace::{LinkBalance, SlotRow};
 use tractive::operator::{Feedback, Request, Status, Switches};
@@ -50,9 +50,10 @@ impl LinePlan {
 }
 
 impl LinePlan {
-    /// `true` if a choke lies between source and link.
-    pub fn has_choke(&self) -> bool {
-        self.link.source.inductance_h > 0.0
+    /// The choke between source and link, and the link's capacitor.
+    pub fn filter(&self) -> LineFilter {
+        let DcLinkSettings { capacitance_f, source, .. } = self.link;
+        LineFilter { inductance_h: source.inductance_h, resistance_ohm: source.resistance_ohm, capacitance_f }
     }
 }
 

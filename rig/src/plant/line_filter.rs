@@ -17,6 +17,20 @@ pub struct LineFilter {
 impl LineFilter {
     /// For 250 kW at 1,500 V: 46 Hz, damped enough for a load of constant power.
     pub const TRACTION: Self = Self { inductance_h: 3e-3, resistance_ohm: 0.3, capacitance_f: 4e-3 };
+
+    /// `true` if a drive that takes a power, in W, at a voltage, in V, has to damp it: its resistance is less than twice that below which such a load makes the link
+    /// swing, `P L/(C U²)`. A battery's cable needs none.
+    pub fn needs_damping(&self, power_w: f64, udc_v: f64) -> bool {
+        let Self { inductance_h, resistance_ohm, capacitance_f } = *self;
+        resistance_ohm < 2.0 * power_w * inductance_h / (capacitance_f * udc_v * udc_v)
+    }
+
+    /// Shorter of the time constants: one over the angular frequency of the swing between choke and capacitor, and that of the current in choke and
+    /// resistance, in s. From 0.1 mH and 0.1 mF on it is 0.1 ms or more.
+    pub fn shortest_s(&self) -> f64 {
+        let Self { inductance_h, resistance_ohm, capacitance_f } = *self;
+        (inductance_h * capacitance_f).sqrt().min(inductance_h / resistance_ohm)
+    }
 }
 
 impl FromStr for LineFilter {
@@ -28,7 +42,7 @@ impl FromStr for LineFilter {
             let parts = text.split(',').map(|part| part.parse::<f64>().ok()).collect::<Option<Vec<_>>>()?;
             let &[inductance_mh, capacitance_mf, resistance_mohm] = parts.as_slice() else { return None };
             let is_good = |low: f64, value: f64, high: f64| (low..=high).contains(&value);
-            let good = is_good(0.1, inductance_mh, 1e3)
+            let good = is_good(0.001, inductance_mh, 1e3)
                 && is_good(0.1, capacitance_mf, 1e3)
                 && is_good(0.0, resistance_mohm, 1e3);
             good.then_some(Self {
@@ -38,15 +52,17 @@ impl FromStr for LineFilter {
             })
         };
         parse().ok_or_else(|| {
-            "must be L_MH,C_MF,R_MOHM (0.1 to 1,000 mH and mF, 0 to 1,000 mΩ), for instance 3,4,30".to_owned()
+            "must be L_MH,C_MF,R_MOHM (0.001 to 1,000 mH, 0.1 to 1,000 mF, 0 to 1,000 mΩ), for instance 3,4,30"
+                .to_owned()
         })
     }
 }
 
 /// The slope of a line that fails, in V/s.
 const LINE_SLOPE_V_S: f64 = 50e3;
-/// Longest step of the choke's current, in s.
+/// Longest step of the choke's current, in s, and as a share of the filter's shortest time constant: explicit steps are stable up to twice that.
 const LONGEST_STEP_S: f64 = 20e-6;
+const LONGEST_SHARE: f64 = 0.2;
 
 /// The link's state behind a line filter.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +85,8 @@ impl FilteredLink {
     /// Lets time pass while the inverter takes an energy, in J, and the line goes to a voltage, in V; `None`: the line is cut off.
     pub fn advance(&mut self, drawn_j: f64, dt_s: f64, line_v: Option<f64>) {
         let LineFilter { inductance_h, resistance_ohm, capacitance_f } = self.filter;
-        let steps = (dt_s / LONGEST_STEP_S).ceil().max(1.0);
+        let longest_s = LONGEST_STEP_S.min(LONGEST_SHARE * self.filter.shortest_s());
+        let steps = (dt_s / longest_s).ceil().max(1.0);
         let step_s = dt_s / steps;
         for _ in 0..steps as u32 {
             match line_v {
@@ -85,6 +102,42 @@ impl FilteredLink {
             let given_j = self.choke_a * self.udc_v * step_s - drawn_j / steps;
             let square = self.udc_v * self.udc_v + 2.0 * given_j / capacitance_f;
             self.udc_v = square.max(1.0).sqrt();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The filter of the guide has to be damped with 246 kW, one with twice the resistance that such a load takes away and a battery's cable have not.
+    #[test]
+    fn a_filter_that_damps_itself_needs_no_drive() {
+        for (text, power_w, udc_v, needs) in [
+            ("3,4,30", 246.4e3, 1_500.0, true),
+            ("3,4,160", 246.4e3, 1_500.0, true),
+            ("3,4,170", 246.4e3, 1_500.0, false),
+            ("0.005,1,25", 1_078.0, 48.0, false),
+            ("0.8,15,18", 1_078.0, 48.0, true),
+        ] {
+            let filter: LineFilter = text.parse().unwrap();
+            assert_eq!(filter.needs_damping(power_w, udc_v), needs, "{text}");
+        }
+        assert!("0.0009,4,30".parse::<LineFilter>().is_err());
+    }
+
+    /// The smallest filters ring at their frequency, and lose no energy but in their resistance.
+    #[test]
+    fn the_smallest_filters_ring_as_theory_says() {
+        for text in ["0.001,0.1,0", "0.005,1,0"] {
+            let filter: LineFilter = text.parse().unwrap();
+            let mut link = FilteredLink::new(filter, 100.0);
+            link.udc_v = 99.0;
+            let period_s = std::f64::consts::TAU * (filter.inductance_h * filter.capacitance_f).sqrt();
+            for _ in 0..10 {
+                link.advance(0.0, period_s, Some(100.0));
+            }
+            assert!((link.udc_v - 99.0).abs() < 0.1, "{text}: {} V", link.udc_v);
         }
     }
 }

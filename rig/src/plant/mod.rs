@@ -144,12 +144,13 @@ impl Plant {
     pub fn advance_on(&mut self, link: &mut DcLink, legs: [Leg; 3], dt_s: f64) {
         let mut left_s = dt_s;
         while left_s > 0.0 {
-            left_s -= if let Some(rest) = self.rest(legs, link.udc_v, left_s) {
+            let now_s = left_s.min(link.longest_step_s());
+            left_s -= if let Some(rest) = self.rest(legs, link.udc_v, now_s) {
                 link.advance(rest.link_a, rest.dt_s);
                 self.finish(rest.state, rest.dt_s);
                 rest.dt_s
             } else {
-                let step_s = self.step_s(&legs, link.udc_v, left_s);
+                let step_s = self.step_s(&legs, link.udc_v, now_s);
                 self.step_on(link, legs, step_s);
                 step_s
             };

@@ -7,7 +7,8 @@ use super::slot::Decision;
 use crate::control::{Boundary, Committed, ModeLimits, Regulated};
 use crate::frames::{AlphaBeta, Angle};
 use crate::modulation::{
-    Mode, Regulation, first_half, index_floor, index_limit, ripple_at, ripple_share, ripple_squares,
+    Mode, Regulation, first_half, index_ceiling, index_floor, index_limit, ripple_at, ripple_share,
+    ripple_squares,
 };
 use crate::time::{Clock, Instant};
 
@@ -95,7 +96,7 @@ pub(super) fn limits(
     ModeLimits {
         follows,
         index_limit,
-        steady_limit: exit.open(follows, index_limit, passed_s),
+        steady_limit: exit.open(follows, [index_ceiling(rate, devices), index_limit], passed_s),
         filled,
         ripple_share: if aliases(mode, settings) { 0.0 } else { ripple_share(trimmed, modulation_index) },
         ripple_s2: Some(ripple_squares(

@@ -101,17 +101,18 @@ impl SixStepExit {
     }
 
     /// The fundamental that an operating point may use, as a share of six-step: all of the `largest`, but for a pattern that follows a carrier, which begins with the
-    /// carrier's and opens from there. A machine that the carrier weakened would change its current within one half: of three such machines two tripped, and
-    /// a car's took 12 % more current than either mode has; now the three take 4 % more at most.
-    pub(super) fn open(&mut self, follows: Regulated, largest: f32, period_s: f32) -> f32 {
+    /// carrier's and opens from there, and below a `ceiling` near the frequency at which a free carrier takes over. A machine that the carrier weakened would change its
+    /// current within one half: of three such machines two tripped, and a car's took 12 % more current than either mode has; now the three take 4 % more at most.
+    pub(super) fn open(&mut self, follows: Regulated, [ceiling, largest]: [f32; 2], period_s: f32) -> f32 {
+        let most = if ceiling < 1.0 { ceiling } else { 1.0 };
         let opened = self.opened_to + EXIT_PER_S * period_s;
+        let is_whole = follows == Regulated::Angle;
         self.opened_to = match follows {
             Regulated::Mean => largest,
-            Regulated::Angle => 1.0,
-            _ if opened > 1.0 => 1.0,
+            _ if is_whole || opened > most => most,
             _ => opened,
         };
-        if self.opened_to < largest { self.opened_to } else { largest }
+        if self.opened_to < largest && !is_whole { self.opened_to } else { largest }
     }
 
     /// The part of a modulation index that has been opened, by which the mode is chosen: a carrier gives way to the pattern that begins where it ends.
@@ -219,19 +220,32 @@ mod tests {
         // 12 a second: a quarter in each of these periods.
         let period_s = 1.0 / 48.0;
         let mut exit = SixStepExit::new();
-        assert_eq!(exit.open(Regulated::Fundamental, 0.75, 0.0), 0.75, "out of rest");
+        assert_eq!(exit.open(Regulated::Fundamental, [2.0, 0.75], 0.0), 0.75, "out of rest");
         assert_eq!(exit.opened(1.25), 1.0);
-        assert_eq!(exit.open(Regulated::Mean, 0.25, period_s), 0.25, "a carrier may use what it has");
+        assert_eq!(exit.open(Regulated::Mean, [2.0, 0.25], period_s), 0.25, "a carrier may use what it has");
         assert_eq!([0.125, 0.5].map(|index| exit.opened(index)), [0.125, 0.25]);
-        assert_eq!(exit.open(Regulated::Fundamental, 0.75, period_s), 0.5);
-        assert_eq!(exit.open(Regulated::Fundamental, 0.75, 0.5 * period_s), 0.625);
+        assert_eq!(exit.open(Regulated::Fundamental, [2.0, 0.75], period_s), 0.5);
+        assert_eq!(exit.open(Regulated::Fundamental, [2.0, 0.75], 0.5 * period_s), 0.625);
         assert_eq!([0.5, 1.25].map(|index| exit.opened(index)), [0.5, 0.625]);
-        assert_eq!(exit.open(Regulated::Fundamental, 0.75, period_s), 0.75);
-        assert_eq!(exit.open(Regulated::Fundamental, 0.75, period_s), 0.75);
+        assert_eq!(exit.open(Regulated::Fundamental, [2.0, 0.75], period_s), 0.75);
+        assert_eq!(exit.open(Regulated::Fundamental, [2.0, 0.75], period_s), 0.75);
         assert_eq!(exit.opened(1.25), 1.0, "no more than six-step");
-        let _ = exit.open(Regulated::Mean, 0.25, period_s);
-        assert_eq!(exit.open(Regulated::Angle, 1.0, period_s), 1.0, "the voltage is what it is");
-        assert_eq!(exit.open(Regulated::Fundamental, 0.75, 0.0), 0.75);
+        let _ = exit.open(Regulated::Mean, [2.0, 0.25], period_s);
+        assert_eq!(exit.open(Regulated::Angle, [2.0, 1.0], period_s), 1.0, "the voltage is what it is");
+        assert_eq!(exit.open(Regulated::Fundamental, [2.0, 0.75], 0.0), 0.75);
+    }
+
+    /// Near the free carrier's frequency a pattern has no more than the ceiling, at once, and square wave gives way by it though its own voltage is what it is.
+    #[test]
+    fn a_pattern_closes_to_where_the_free_carrier_begins() {
+        let period_s = 1.0 / 48.0;
+        let mut exit = SixStepExit::new();
+        assert_eq!(exit.open(Regulated::Angle, [0.96875, 1.0], period_s), 1.0);
+        assert_eq!(exit.opened(1.25), 0.96875);
+        assert_eq!(exit.open(Regulated::Fundamental, [0.9375, 0.99], period_s), 0.9375);
+        assert_eq!(exit.opened(1.25), 0.9375);
+        let _ = exit.open(Regulated::Mean, [0.9375, 0.5], period_s);
+        assert_eq!(exit.open(Regulated::Fundamental, [0.9375, 0.99], period_s), 0.75, "as slowly as ever");
     }
 
     #[test]

@@ -64,12 +64,16 @@ impl Plan {
         }
     }
 
-    /// The same with a line filter in front of the link's contactors, where the scenario has them.
+    /// The same with a line filter in front of the link's contactors, where the scenario has them: precharge and discharge of its capacitor take as long as
+    /// before.
     pub(super) fn behind(mut self, filter: Option<LineFilter>) -> Self {
         if let (Some(line), Some(filter)) = (&mut self.line, filter) {
             let LineFilter { inductance_h, resistance_ohm, capacitance_f } = filter;
             let source = Source { inductance_h, resistance_ohm, ..line.link.source };
-            line.link = DcLinkSettings { capacitance_f, source, ..line.link };
+            let longer = line.link.capacitance_f / capacitance_f;
+            let precharge_ohm = line.link.precharge_ohm * longer;
+            let discharge_ohm = line.link.discharge_ohm * longer;
+            line.link = DcLinkSettings { capacitance_f, source, precharge_ohm, discharge_ohm, ..line.link };
         }
         self
     }

@@ -3,7 +3,7 @@
 use super::{Options, PatternsName, Plan};
 use crate::bench::LinePlan;
 use crate::machine::Machine;
-use crate::plant::DcLinkSettings;
+use crate::plant::{DcLinkSettings, LineFilter};
 use crate::run::traction::Tasks;
 use crate::run::{self, CLOCK, ticks};
 use anyhow::Result;
@@ -40,7 +40,10 @@ pub(super) fn setup(plan: &Plan, options: &Options, machine: &Machine, over_prot
         line: plan.line.as_ref().map(|plan| times(&plan.link)),
         over_protocol,
         uncompensated,
-        behind_line_filter: options.own.line.is_some() || plan.line.as_ref().is_some_and(LinePlan::has_choke),
+        behind_line_filter: line_filter(plan, options).is_some_and(|filter| {
+            let power_w = machine.folder.parameters.max_power_w * f64::from(options.own.drives);
+            filter.needs_damping(power_w, udc_v(options, machine))
+        }),
         angle_late_s: options.own.known_late_s(),
         angle_step_rad: angle_step_rad(options, machine),
         current_filter_ticks: options.own.known_filter_ticks(),
@@ -49,6 +52,11 @@ pub(super) fn setup(plan: &Plan, options: &Options, machine: &Machine, over_prot
         iron_permille: options.own.known_iron_permille(machine),
         train: plan.train,
     }
+}
+
+/// The line filter in front of the link.
+fn line_filter(plan: &Plan, options: &Options) -> Option<LineFilter> {
+    plan.line.as_ref().map(LinePlan::filter).or(options.own.line)
 }
 
 /// Step of the encoder's counts, electrical, in rad; 0 without an encoder.
