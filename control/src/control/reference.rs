@@ -112,8 +112,12 @@ pub(super) fn point(
     let Weakened { current, torque_nm, region, inside } =
         weakened(torque_nm, best.squared(), &Electrical { omega, voltage_v, resistance }, tables);
     let right = current.d - best.d >= MTPA_OFF * tables.ratings.max_current_a;
-    // Right of it the circle is larger than its flux linkage, and where the largest current ends on it before the torque is reached, it does so inside.
-    if !limit.filled && (right || inside && region == Region::Weakening) {
+    let is_least = match region {
+        Region::Weakening => right || inside,
+        // Where the voltage is a little more than it needs, the circle of its flux linkage may meet the largest current at less torque.
+        _ => steady_v.squared() <= voltage_v * voltage_v,
+    };
+    if is_least && !limit.filled {
         return unweakened;
     }
     OperatingPoint { current, flux: flux_linkage(tables, current), torque_nm, region, modulation_index }

@@ -200,10 +200,15 @@ impl Course {
         };
         self.zero.turn(back_share, mean.d / bound_a, seen.length_s);
         let drop = self.drop_v(mean, seen.frame);
+        let fed = seen.acted - drop * seen.length_s;
         let learns = change.squared() > (LEARNT_SHARE * bound_a) * (LEARNT_SHARE * bound_a);
+        if matches!(self.stage, Stage::AlongQ | Stage::AlongBoth) {
+            let is_outward = learns && mean.q * fed.q > 0.0;
+            self.pulses.went(is_outward, inductance.flux(change).q / fed.q);
+        }
         // Where a current stands still its changes tell little.
         if learns && !matches!(self.stage, Stage::Probe | Stage::Rest | Stage::Turn | Stage::Done) {
-            inductance.learn(change, seen.acted - drop * seen.length_s, NOISE_SHARE * bound_a);
+            inductance.learn(change, fed, NOISE_SHARE * bound_a);
         }
         let [along_d, along_q] = match self.stage {
             Stage::Done if self.step > 0 => [0.0; 2],

@@ -33,6 +33,8 @@ pub struct Pulses {
     /// Share of the bound that the next pulse may come to; and the one that the current has come into.
     share: f32,
     within: f32,
+    /// The change along q that the newest half on the way outward made, over the one that was expected of it, from 1.
+    further: f32,
 }
 
 /// Change of current of a command, as a share of the bound: along d alone, along q, and along d beside q.
@@ -54,6 +56,8 @@ const TOLERATED_SHARE: f32 = 0.02;
 const FAR_SHARE: f32 = 0.6;
 /// The change along q that a command may make where the iron saturates as the current goes outward, over the one that it is to make.
 const OUTWARD: f32 = 1.7;
+/// Most of what a half on the way outward makes over what was expected of it that is believed.
+const FURTHEST: f32 = 2.0;
 /// Largest current along +d, as a share of the bound.
 const POSITIVE_SHARE: f32 = 0.2;
 /// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts: so many halves, for the
@@ -74,7 +78,16 @@ const BACK_SHARE: f32 = 0.15;
 impl Pulses {
     /// Before the first pulse.
     pub const fn new() -> Self {
-        Self { d: -1.0, q: 1.0, turned_rad: 0.0, omega: 0.0, length_s: 1.0, share: 1.0, within: 1.0 }
+        Self {
+            d: -1.0,
+            q: 1.0,
+            turned_rad: 0.0,
+            omega: 0.0,
+            length_s: 1.0,
+            share: 1.0,
+            within: 1.0,
+            further: 1.0,
+        }
     }
 
     /// A number of this a half, per s.
@@ -100,6 +113,12 @@ impl Pulses {
         }
         self.turned_rad += seen.turned;
         self.omega = seen.omega;
+    }
+
+    /// Notes the change along q that a half made, over what was expected of it. The next one outward is asked for less, by its fourth power: what iron
+    /// saturates as the current goes outward, it saturates the more in the half that is commanded and the one behind it.
+    pub fn went(&mut self, is_outward: bool, over_expected: f32) {
+        self.further = if is_outward { limit(over_expected, 1.0, FURTHEST) } else { 1.0 };
     }
 
     /// Turn of the rotor since the experiment began, electrical, in rad.
@@ -173,7 +192,8 @@ impl Pulses {
         let back = (region.held - ahead) * HELD_SHARE;
         let change = if region.along_q {
             let slow = region.bound_a * SLOW_SHARE;
-            Dq { d: limit(back.d, -slow, slow), q: self.q * q_step }
+            let squared = if ahead.q * self.q > 0.0 { self.further * self.further } else { 1.0 };
+            Dq { d: limit(back.d, -slow, slow), q: self.q * q_step / (squared * squared) }
         } else {
             Dq { d: self.d * d_step, q: limit(back.q, -q_step, q_step) }
         };
