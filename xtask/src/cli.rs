@@ -103,7 +103,7 @@ pub struct TimingArgs {
     /// Take the numbers into docs/cost.md and sizes.toml
     #[arg(long)]
     pub write: bool,
-    /// Measure the image that identifies its machine instead, against the drive's budgets
+    /// Measure the image that identifies its machine instead, against budgets of its own
     #[arg(long, conflicts_with_all = ["json", "write", "profile"])]
     pub identify: bool,
     /// Say where the instructions go: this many functions of each interrupt
