@@ -226,12 +226,26 @@ fn corner_rpm(map: &SmoothMap, current: (f64, f64), given: &Given) -> f64 {
     low
 }
 
+/// Current along d, in A, that leaves the least flux linkage; of inductances that are a thousand times too large it lies between two steps of any scan.
+fn weakened_a(map: &SmoothMap, max_current_a: f64) -> f64 {
+    let (mut low, mut high) = (-max_current_a, 0.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if map.at(middle, 0.0).psi_d_wb < 0.0 { low = middle } else { high = middle }
+    }
+    high
+}
+
 /// At the largest speed some current must leave a voltage that the nominal link gives.
 fn check_speed(map: &SmoothMap, given: &Given) -> Result<()> {
     const STEPS: i32 = 200;
+    let weakened_a = weakened_a(map, given.max_current);
     let least_v = |rpm: f64| {
         let along_d = (0..=STEPS).map(|k| -given.max_current * f64::from(k) / f64::from(STEPS));
-        along_d.map(|id| voltage_v(map, (id, 0.0), given.omega(rpm), given.rs)).fold(f64::INFINITY, f64::min)
+        along_d
+            .chain([weakened_a])
+            .map(|id| voltage_v(map, (id, 0.0), given.omega(rpm), given.rs))
+            .fold(f64::INFINITY, f64::min)
     };
     if least_v(given.max_speed_rpm) <= given.voltage_v() {
         return Ok(());
