@@ -544,21 +544,39 @@ fn much_saturation_keeps_the_bound_of_current() {
     let tram = TRAM.replace(" --saturation 0.6", "");
 
     // Reluctance alone, a car, a servo, much reluctance behind few volt-seconds, little of anything, 300 kW.
-    for values in [
-        "--pole-pairs 2 --rs 0.1 --ld 0.5e-3 --lq 3e-3 --psi-f 0 --max-current 30 --udc 48 --max-speed-rpm 3000 --max-switching-hz 16000",
-        "--pole-pairs 4 --rs 0.01 --ld 0.13e-3 --lq 0.35e-3 --psi-f 0.075 --max-current 550 --udc 370 --max-speed-rpm 12000 --max-switching-hz 10000",
-        "--pole-pairs 5 --rs 0.9 --ld 6e-3 --lq 11e-3 --psi-f 0.18 --max-current 20 --udc 560 --max-speed-rpm 4500 --max-switching-hz 8000",
-        "--pole-pairs 2 --rs 0.25 --ld 6e-3 --lq 55e-3 --psi-f 0.22 --max-current 60 --udc 560 --max-speed-rpm 4500 --max-switching-hz 8000",
-        "--pole-pairs 4 --rs 0.06 --ld 0.36e-3 --lq 0.55e-3 --psi-f 0.0125 --max-current 30 --udc 48 --max-speed-rpm 6000 --max-switching-hz 20000",
-        "--pole-pairs 4 --rs 0.012 --ld 0.55e-3 --lq 1.4e-3 --psi-f 0.62 --max-current 800 --udc 1500 --max-speed-rpm 4500 --max-switching-hz 2000",
-        &tram,
+    for (values, least_reach) in [
+        (
+            "--pole-pairs 2 --rs 0.1 --ld 0.5e-3 --lq 3e-3 --psi-f 0 --max-current 30 --udc 48 --max-speed-rpm 3000 --max-switching-hz 16000",
+            0.6,
+        ),
+        (
+            "--pole-pairs 4 --rs 0.01 --ld 0.13e-3 --lq 0.35e-3 --psi-f 0.075 --max-current 550 --udc 370 --max-speed-rpm 12000 --max-switching-hz 10000",
+            0.6,
+        ),
+        (
+            "--pole-pairs 5 --rs 0.9 --ld 6e-3 --lq 11e-3 --psi-f 0.18 --max-current 20 --udc 560 --max-speed-rpm 4500 --max-switching-hz 8000",
+            0.6,
+        ),
+        (
+            "--pole-pairs 2 --rs 0.25 --ld 6e-3 --lq 55e-3 --psi-f 0.22 --max-current 60 --udc 560 --max-speed-rpm 4500 --max-switching-hz 8000",
+            0.5,
+        ),
+        (
+            "--pole-pairs 4 --rs 0.06 --ld 0.36e-3 --lq 0.55e-3 --psi-f 0.0125 --max-current 30 --udc 48 --max-speed-rpm 6000 --max-switching-hz 20000",
+            0.6,
+        ),
+        (
+            "--pole-pairs 4 --rs 0.012 --ld 0.55e-3 --lq 1.4e-3 --psi-f 0.62 --max-current 800 --udc 1500 --max-speed-rpm 4500 --max-switching-hz 2000",
+            0.6,
+        ),
+        (&tram, 0.6),
     ] {
         driven(&format!("{values} --saturation 0.4"), 8, |seed, recording, bound_a| {
             let peak_a = recording.rows.iter().map(|row| row.id_a.hypot(row.iq_a)).fold(0.0, f64::max);
             let (peak_share, reach) = (peak_a / bound_a, reach(recording, bound_a));
             println!("{bound_a} A, seed {seed}: {peak_share:.3} of the bound, reach {reach:.3}");
             assert!(peak_share < 1.1, "{bound_a} A, seed {seed}: {peak_share} of the bound");
-            assert!(reach > 0.5, "{bound_a} A, seed {seed}: {reach}");
+            assert!(reach > least_reach, "{bound_a} A, seed {seed}: {reach}");
         });
     }
 }

@@ -40,6 +40,8 @@ const THREE: &str = "--pole-pairs 3 --rs 0.2 --max-current 70 --max-speed-rpm 15
 const SMALL: &str = "--pole-pairs 4 --rs 0.5 --max-current 15 --max-speed-rpm 3000 --inertia 0.002 --ld 0.005 --lq 0.008 --psi-f 0.15";
 /// Of 2 N·m, at 48 V, with rotors of their own alone.
 const LAB: &str = "--zs9-source 48 --pole-pairs 4 --rs 0.1 --max-current 25 --max-speed-rpm 3000 --inertia 0.0004 --ld 0.5e-3 --lq 0.8e-3 --psi-f 0.012";
+/// Of 0.6 N·m, on a source of 12 V: links that an absolute voltage would have to know.
+const BATTERY: &str = "--zs9-source 12 --pole-pairs 4 --rs 0.03 --max-current 25 --max-speed-rpm 2000 --inertia 0.0002 --ld 0.1e-3 --lq 0.15e-3 --psi-f 0.004";
 /// Whose magnets make twice the voltage of the paper's source.
 const STRONG: &str = "--pole-pairs 4 --rs 0.1 --max-current 200 --max-speed-rpm 2000 --inertia 0.5 --ld 0.0025 --lq 0.005 --psi-f 0.6";
 
@@ -55,7 +57,7 @@ fn verdicts(outcome: &Outcome) -> &[Value] {
 #[test]
 fn every_machine_is_asked_its_own_shares() {
     let place = tempfile::tempdir().unwrap();
-    for (name, nameplate) in [("three", THREE), ("small", SMALL), ("lab", LAB)] {
+    for (name, nameplate) in [("three", THREE), ("small", SMALL), ("lab", LAB), ("battery", BATTERY)] {
         let folder = machine(place.path(), name, nameplate);
         for line in ["zs9-steady", "zs9-load-step", "zs9-reverse", "zs9-cycle --cruise 2"] {
             let outcome = on(line, &folder);

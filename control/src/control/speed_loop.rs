@@ -20,7 +20,8 @@ impl SpeedDesign {
     /// Largest torque that a speed error of 1 rad/s may ask for, as a multiple of the largest: more is noise of the speed.
     pub const STIFFEST: f32 = 10.0;
 
-    /// A loop for what the largest torque turns of a machine: quick, unless that is so heavy that the error's torque would be too stiff.
+    /// A loop for the rotor of a machine, with a natural frequency in rad/s, above 0, and the control period in s. The inertia is that of `J = n_p T/α`, of largest torque and
+    /// electrical acceleration; a rotor that would need more than [`Self::STIFFEST`], `2 J ω₀ > 10 T`, has a lower frequency.
     pub const fn of(ratings: &Ratings, natural_rad_s: f32, period_s: f32) -> Self {
         let inertia_kg_m2 = ratings.max_torque_nm * ratings.pole_pairs / ratings.max_acceleration_rad_s2;
         let most_rad_s = 0.5 * Self::STIFFEST * ratings.max_torque_nm / inertia_kg_m2;

@@ -11,10 +11,10 @@ use crate::protection::{self, FailedCheck, Fault, MaskedFaults, SafeState, Trip}
 use crate::time::Instant;
 use core::sync::atomic::Ordering;
 
-/// The largest move of the link in a carrier period that is believed, in V; more is an error of the measurement.
-const MOST_MOVED_V: f32 = 10.0;
-/// Least link voltage that is divided by, in V.
-const LEAST_LINK_V: f32 = 50.0;
+/// The largest move of the link in a carrier period that is believed, over the source's nominal voltage; more is an error of the measurement.
+const MOST_MOVED_SHARE: f32 = 0.025;
+/// Least link voltage that is divided by, over the source's nominal voltage.
+const LEAST_LINK_SHARE: f32 = 0.125;
 
 /// Phase current, as a share of the largest, whose sign may change within a period.
 const SMALL_CURRENT_SHARE: f32 = 0.05;
@@ -156,9 +156,11 @@ impl<M: Machine> PwmTask<M> {
     fn request(&self, command: &DualCommand, sample: &PowerSample) -> Request {
         let link_v = link_v(sample);
         // As far ahead as the last peak is back lies the middle of the period that is made here.
-        let moved_v = limit(link_v - self.last_link_v.unwrap_or(link_v), -MOST_MOVED_V, MOST_MOVED_V);
+        let source_v = self.machine.tables().z_source.source_v;
+        let (most_v, least_v) = (MOST_MOVED_SHARE * source_v, LEAST_LINK_SHARE * source_v);
+        let moved_v = limit(link_v - self.last_link_v.unwrap_or(link_v), -most_v, most_v);
         let link_v = link_v + moved_v;
-        let link_v = if link_v > LEAST_LINK_V { link_v } else { LEAST_LINK_V };
+        let link_v = if link_v > least_v { link_v } else { least_v };
         let index_per_volt = 2.0 / link_v;
         let ahead = self.now.since(command.at) as f32;
         let [upper, lower] = command.motors.map(|motor| MotorVoltage {
