@@ -201,6 +201,15 @@ fn a_demand_beyond_what_the_link_gives_is_damped() {
     }
 }
 
+/// The start of square wave at full torque, behind a large filter: with a voltage limit that follows the link there, too, torque swung by 13 % more than the ripple has.
+#[test]
+fn square_wave_begins_within_its_ripple() {
+    let chosen = catalogue::of_traction("steady --speed 1905 --torque 1235 --line 8,4,10").unwrap();
+    let machine = chosen.machine().unwrap();
+    let figures = chosen.figures(&chosen.drive(&machine).unwrap(), &machine);
+    assert!(!figures.fall_short(), "{:?}", figures.get("verdicts"));
+}
+
 /// A battery's cable swings at kilohertz, and is damped by its own resistance: the drive leaves it alone, and steps and precharge keep their bounds.
 #[test]
 fn a_batterys_cable_needs_no_damping() {
