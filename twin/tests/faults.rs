@@ -54,8 +54,10 @@ fn told(system: System, cause: Cause, when: When, seen: &Seen) -> bool {
         Cause::Overcurrent => ["fault hardware_overcurrent", "fault overcurrent"].contains(&told),
         Cause::Hang | Cause::Debugger | Cause::HardFault => told == "fault start_refused" && seen.resets == 1,
         // The diodes still carry the turning motors' current when the start looks for the sensors' zeros: reason 10.
+        // Without torque it may have died away by then: that turns on 0.2 ms of the idle loop.
         Cause::BrownOut if system == System::Zs9 && seen.pulsed => {
-            told == "fault start_refused" && seen.resets == 1
+            let is_found = matches!(when, When::Enabled) && told == "ready";
+            (is_found || told == "fault start_refused") && seen.resets == 1
         }
         // The contactors that open within 20 ms are found closed by the start, where they were.
         Cause::BrownOut => ["ready", "fault contactor"].contains(&told) && seen.resets == 1,

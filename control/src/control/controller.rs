@@ -232,12 +232,10 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
         let demand_nm = self.demand.step(&shaping, ratings);
         let link = self.link.step(udc_v * link_scale, change_v * link_scale, period_s);
+        // In square wave the voltage follows the link by itself; a limit that did so too made the torque swing by up to 68 % over its ripple.
+        let limiting = swing.filter(|_| limits.follows != Regulated::Angle);
         let limit = VoltageLimit {
-            // In square wave the voltage follows the link by itself; a limit that did so too made the torque swing by up to 68 % over its ripple.
-            udc_v: swing
-                .filter(|_| limits.follows != Regulated::Angle)
-                .map_or(link.slow_v, |swing| swing.udc_v * link_scale)
-                / flux,
+            udc_v: limiting.map_or(link.slow_v, |swing| swing.udc_v * link_scale) / flux,
             modulation_index: limits.steady_limit,
             filled: limits.filled,
         };
