@@ -42,6 +42,7 @@ use tractive::identification::{Observation, Stage};
 
 /// The options of an identification.
 #[derive(Clone, Debug, Args)]
+#[command(mut_arg("out", |arg| arg.help("The machine folder to make")))]
 pub struct Identify {
     /// The drive and its bench; of `--machine` only its nameplate is known, `--out` is the machine folder that is made.
     #[command(flatten)]

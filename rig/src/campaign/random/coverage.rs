@@ -30,7 +30,9 @@ pub fn coverage(runs: &[Run]) -> String {
             *borders.entry(pair.join(" → ")).or_insert(0_usize) += 1;
         }
         *ends.entry((outcome.named.as_str(), outcome.safe_state.as_str())).or_insert(0_usize) += 1;
-        *faults.entry(outcome.fault.as_str()).or_insert(0_usize) += 1;
+        if outcome.fault != "none" {
+            *faults.entry(outcome.fault.as_str()).or_insert(0_usize) += 1;
+        }
     }
     for (head, counts) in [("mode", modes), ("operating point", regions)] {
         let _ = writeln!(
