@@ -49,6 +49,9 @@ pub fn packages(named: &[String]) -> Vec<String> {
     if named.is_empty() { PACKAGES.map(str::to_owned).into() } else { named.to_vec() }
 }
 
+/// The folder of the programs with all mutants.
+const TOGETHER: &str = "build";
+
 /// Builds until all is compiled, at most; every build leaves out what the last one complained of.
 const BUILDS: usize = 60;
 
@@ -71,7 +74,7 @@ pub fn programs(
     only: &BTreeSet<u32>,
     left_out: &mut BTreeMap<u32, String>,
 ) -> Result<Vec<Program>> {
-    let (to, target) = (&work.join("tree"), &work.join("build"));
+    let (to, target) = (&work.join("tree"), &work.join(TOGETHER));
     for _ in 0..BUILDS {
         let mut schemata = BTreeMap::new();
         for source in &tree.sources {
@@ -151,6 +154,10 @@ fn cargo(to: &Path, target: &Path, packages: &[&str], what: &[&str]) -> Result<M
         command.args(["--config", &format!("profile.release.package.{package}.opt-level=1")]);
     }
     command.env("CARGO_TARGET_DIR", target).env("RUSTC_WORKSPACE_WRAPPER", wrapper);
+    if target.ends_with(TOGETHER) {
+        // In the repository's own folder, where other people's crates are compiled already.
+        command.envs(to.ancestors().nth(2).map(|folder| ("CARGO_BUILD_BUILD_DIR", folder)));
+    }
     command.env("CARGO_PROFILE_RELEASE_INCREMENTAL", "true");
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::inherit());
     let output = command.output().context("cannot start cargo")?;

@@ -99,7 +99,8 @@ fn build() -> Result<Result<PathBuf, String>> {
     let host = version.lines().find_map(|line| line.strip_prefix("host: ")).context("rustc names no host")?;
     let out = root().join("target/fuzz");
     let mut command = cargo();
-    // With a target named the flags are not those of build scripts.
+    // With a target named the flags are not those of build scripts, which with their macros lie compiled in the workspace's own folder.
+    command.env("CARGO_BUILD_BUILD_DIR", root().join("target"));
     command.args(["build", "--release", "--locked", "--manifest-path", "fuzz/Cargo.toml", "--target", host]);
     command.arg("--target-dir").arg(&out).env("CARGO_ENCODED_RUSTFLAGS", FLAGS.join("\x1f"));
     if !succeeds(&mut command)? {

@@ -17,6 +17,9 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 /// Names of Chromium, the first one Debian's package too.
 const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
+/// The release of Unicorn that the twin names.
+const UNICORN: &str = "2.1.3";
+
 /// The toolchain that Miri belongs to.
 const NIGHTLY: &str = "nightly";
 
@@ -131,8 +134,35 @@ impl Setup {
         found()
     }
 
-    /// CMake, with which the twin's emulator is built.
-    pub fn cmake(&mut self) -> bool {
+    /// The twin's emulator: compiled, out of the Python package that has the library inside; else what it is compiled with.
+    pub fn emulator(&mut self) -> bool {
+        self.unicorn() || self.cmake()
+    }
+
+    /// Unicorn's library of the very release that the twin names, where `.cargo/config.toml` has pkg-config look for it.
+    fn unicorn(&mut self) -> bool {
+        let tools = root().join("target/tools/unicorn");
+        let (library, told) = (tools.join("unicorn/lib/libunicorn.a"), tools.join("unicorn.pc"));
+        if !library.is_file() && find("python3").is_some() {
+            say("fetching Unicorn (pip install)");
+            let package = format!("unicorn=={UNICORN}");
+            let install =
+                ["-m", "pip", "install", "--no-deps", "--only-binary", ":all:", &package, "--target"];
+            quietly(Command::new("python3").args(install).arg(&tools));
+        }
+        if find("pkg-config").is_none() {
+            self.apt_install(&["pkg-config"]);
+        }
+        let libs = "Libs: -L${pcfiledir}/unicorn/lib -lunicorn";
+        let told_now = format!("Name: unicorn\nDescription: emulator\nVersion: {UNICORN}\n{libs}\n");
+        let is_told = || std::fs::read_to_string(&told).is_ok_and(|text| text == told_now);
+        find("pkg-config").is_some()
+            && library.is_file()
+            && (is_told() || std::fs::write(&told, &told_now).is_ok())
+    }
+
+    /// CMake, with which the emulator is built.
+    fn cmake(&mut self) -> bool {
         const PROGRAM: &str = "cmake";
         if find(PROGRAM).is_none() {
             self.apt_install(&[PROGRAM]);
@@ -333,6 +363,14 @@ mod tests {
         assert!(lists_machine(help));
         assert!(!lists_machine("mps2-an3860  another"));
         assert!(!lists_machine(""));
+    }
+
+    #[test]
+    fn the_compiled_emulator_is_of_the_twins_release() {
+        let manifest = std::fs::read_to_string(root().join("twin/Cargo.toml")).unwrap();
+        assert!(manifest.contains(&format!("unicorn-engine = {{ version = \"={UNICORN}\"")));
+        let config = std::fs::read_to_string(root().join(".cargo/config.toml")).unwrap();
+        assert!(config.contains("\"target/tools/unicorn\""));
     }
 
     #[test]

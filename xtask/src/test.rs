@@ -345,7 +345,7 @@ mod tests {
         let groups = together().unwrap().map(|(packages, _)| packages);
         let once = groups.iter().filter(|packages| *packages != ONCE_MORE);
         let mut tested: Vec<_> = once.flat_map(|packages| packages.split(' ')).collect();
-        // Step `twin` tests it, where there is cmake.
+        // Step `twin` tests it, where there is its emulator.
         tested.push(twin::PACKAGE);
         there.sort_unstable();
         tested.sort_unstable();

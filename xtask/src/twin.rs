@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// The twin's package: no default member, as it needs cmake.
+/// The twin's package: no default member, as it needs an emulator, and where that is not to be had compiled, cmake.
 pub const PACKAGE: &str = "tractive-twin";
 /// The board that it is the twin of.
 const BOARD: &str = "nucleo-g474re";
@@ -26,8 +26,8 @@ const OUT: &str = "target/tractive/twin";
 /// The command.
 pub fn run(args: &TwinArgs) -> Result<u8> {
     let mut setup = Setup::default();
-    if !setup.cmake() {
-        bail!("{}", no_cmake());
+    if !setup.emulator() {
+        bail!("{}", no_emulator());
     }
     let script = script(args.scenario.as_deref().unwrap_or(Path::new(SCENARIO)), args.system)?;
     let image = image(&mut setup, args.system)?;
@@ -64,8 +64,8 @@ fn scripts(system: System) -> Result<Vec<PathBuf>> {
 
 /// The step: lints and tests of what no other step sees, then the images through all their scenarios. The inner error is what is missing.
 pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
-    if !setup.cmake() {
-        return Ok(Err(no_cmake()));
+    if !setup.emulator() {
+        return Ok(Err(no_emulator()));
     }
     let lints = ["--all-targets", "--", "-D", "warnings"];
     let tidy = !setup.component("clippy", "clippy") || succeeds(twin("clippy").args(lints))?;
@@ -142,6 +142,6 @@ fn drive(image: &Path, system: System, script: &Path, out: &Path) -> Command {
     command
 }
 
-fn no_cmake() -> String {
-    "cmake is missing, and cannot be installed (Debian: apt-get install cmake)".to_owned()
+fn no_emulator() -> String {
+    "Unicorn cannot be fetched by pip, and cmake is missing and cannot be installed (Debian: apt-get install cmake)".to_owned()
 }
