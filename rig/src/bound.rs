@@ -55,7 +55,8 @@ pub fn beside(
     let last = rows.last()?;
     let measured = distortion::of_recording(recording, window, &machine.folder);
     let bound = Distortion::of(&ideal(rows, options, machine)?);
-    let excess = |value: f64, bound: f64| (value / bound - 1.0) * 100.0;
+    // Of pulses that make no ripple none is no excess.
+    let excess = |value: f64, bound: f64| if value == bound { 0.0 } else { (value / bound - 1.0) * 100.0 };
     Some(Beside {
         speed_rpm: last.speed_rpm,
         mode: last.mode.name(),

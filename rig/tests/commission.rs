@@ -1,12 +1,19 @@
 //! A commissioning on the rig, without anybody who answers.
 
+mod nameplate;
+
 use std::path::Path;
 use std::process::Command;
 
 /// The exit code, what was said, and the record.
 fn commissioned(words: &str, place: &Path) -> (i32, String, toml::Table) {
+    free("3", &format!("--noise-a 0.5 {words}"), place)
+}
+
+/// The same of a free rotor of this inertia, in kg·m², without noise.
+fn free(inertia: &str, words: &str, place: &Path) -> (i32, String, toml::Table) {
     let mut rig = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
-    rig.args("commission --yes --inertia 3 --noise-a 0.5".split(' ')).args(words.split_whitespace());
+    rig.args(["commission", "--yes", "--inertia", inertia]).args(words.split_whitespace());
     rig.arg("--out").arg(place.join("found")).arg("--page").arg(place.join("found.html"));
     let output = rig.output().unwrap();
     let record = std::fs::read_to_string(place.join("found-commissioning.toml")).unwrap();
@@ -41,6 +48,19 @@ fn from_the_wiring_to_the_first_torque() {
     let speed_rpm = found(&record, 3, "speed_reached_rpm");
     assert!((speed_rpm - 0.3 * asked_nm / 3.0 * 9.549).abs() < 0.05 * speed_rpm, "{speed_rpm}");
     assert!(place.path().join("found/flux_map.csv").is_file());
+}
+
+/// A direct drive without its load, which a twentieth of its largest torque would take beyond its largest speed: it ended in `overspeed`.
+#[test]
+fn the_first_torque_takes_a_direct_drive_to_half_of_its_largest_speed() {
+    let machine = nameplate::made(
+        "--pole-pairs 20 --rs 0.5 --ld 4e-3 --lq 5e-3 --psi-f 0.3 --max-current 20 --udc 560 --max-speed-rpm 150 --max-switching-hz 8000",
+    );
+    let place = tempfile::tempdir().unwrap();
+    let (code, said, record) = free("0.1", &format!("--machine {}", machine.path().display()), place.path());
+    assert_eq!(code, 0, "{said}");
+    let speed_rpm = found(&record, 3, "speed_reached_rpm");
+    assert!((speed_rpm - 75.0).abs() < 4.0, "{speed_rpm}");
 }
 
 /// A zero that is some degrees off: the tables are of the zero that is right, the key to change and the number to add are told, and with it

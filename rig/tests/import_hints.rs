@@ -62,6 +62,12 @@ fn the_reading_that_makes_a_map_a_machines_is_named_and_does() {
             "--negate id,psi_d",
             truth,
         ),
+        (plane(|id, iq| truth(-id, iq)), "--negate id", truth),
+        (plane(|id, iq| truth(id, -iq)), "--negate iq", truth),
+        (plane(|id, iq| (-truth(id, iq).0, truth(id, iq).1)), "--negate psi_d", truth),
+        (plane(|id, iq| (-truth(id, -iq).0, truth(id, -iq).1)), "--negate iq,psi_d", truth),
+        (plane(|id, iq| (-truth(-id, -iq).0, truth(-id, -iq).1)), "--negate id,iq,psi_d", truth),
+        (plane(|id, iq| across(id, -iq, truth)), "--d-axis reluctance --negate iq", truth),
         (polar, "--angle-from d", truth),
     ]
     .into_iter()

@@ -1,5 +1,7 @@
 //! The scenarios with a line side: every verdict is kept, on the built-in machine and where things are harder.
 
+mod nameplate;
+
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::{Recorded, Recording};
 
@@ -103,6 +105,17 @@ fn a_wheel_that_loses_its_grip_is_caught() {
     assert!(recording.trip().is_none());
     let rise = short.iter().find_map(|short| short.strip_prefix("\"change of speed in 0.1 s (share)\": "));
     assert!(rise.is_some_and(|rise| rise.parse::<f64>().unwrap() > 0.2), "{short:?}");
+}
+
+/// A light rotor's angle is followed so quickly that its sensor's errors are seen as changes of speed: they took away all torque of a wheel with grip.
+#[test]
+fn an_angle_that_is_off_is_no_slip() {
+    let folder = nameplate::made(
+        "--pole-pairs 4 --rs 0.06 --ld 0.36e-3 --lq 0.55e-3 --psi-f 0.0125 --saturation 0.8 --max-current 30 --udc 48 --max-speed-rpm 6000 --max-switching-hz 8000 --inertia 0.0001",
+    );
+    for error in ["--angle-1f-deg 3", "--angle-2f-deg 3", "--encoder-lines 128"] {
+        keeps_all(&format!("wheel {error} --machine {}", folder.path().display()));
+    }
 }
 
 #[test]

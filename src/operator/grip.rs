@@ -1,6 +1,6 @@
 //! Slip and slide: a rotor that accelerates faster than a train can has lost its rail.
 //!
-//! A reference follows the rotor's speed along the torque, motoring upward, braking downward, at most at the acceleration limit. What the rotor is
+//! A reference follows the rotor's speed, smoothed, along the torque, motoring upward, braking downward, at most at the acceleration limit. What the rotor is
 //! ahead of it is slip. The torque's share falls at once in proportion to the slip, and further while it lasts; with grip it comes back along a
 //! straight line.
 
@@ -13,12 +13,17 @@ const SPAN: f32 = 0.02;
 /// Time in which slip of the whole span takes all torque away for good, and in which it comes back, in s.
 const LOSE_S: f32 = 0.3;
 const RESTORE_S: f32 = 1.0;
+/// Time constant by which the rotor's speed is smoothed, in s. An angle that is off by ε once or twice a turn moves a speed that is smoothed over τ by ε/τ to both
+/// sides, electrical, whatever the speed.
+const SMOOTHED_S: f32 = 0.016;
 
 /// The grip on the rail.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grip {
     /// Direction of the torque.
     along: f32,
+    /// The rotor's speed, smoothed, mechanical, in rad/s.
+    speed: f32,
     /// The reference, along the torque, mechanical, in rad/s.
     reference: f32,
     /// Share of the torque that comes back slowly.
@@ -28,7 +33,7 @@ pub(super) struct Grip {
 }
 
 impl Grip {
-    pub(super) const FULL: Self = Self { along: 0.0, reference: 0.0, held: 1.0, share: 1.0 };
+    pub(super) const FULL: Self = Self { along: 0.0, speed: 0.0, reference: 0.0, held: 1.0, share: 1.0 };
 
     /// Share of the demand that the rail bears.
     pub(super) const fn share(&self) -> f32 {
@@ -40,7 +45,8 @@ impl Grip {
     pub(super) fn step(&mut self, torque_nm: f32, speed: f32, settings: &Settings) {
         let Settings { ratings, slot_s, train, .. } = *settings;
         let along = if torque_nm == 0.0 { 0.0 } else { 1.0_f32.copysign(torque_nm) };
-        let (now, most) = (along * speed, self.reference + train.acceleration_rad_s2 * slot_s);
+        self.speed += (speed - self.speed) * (slot_s / (slot_s + SMOOTHED_S));
+        let (now, most) = (along * self.speed, self.reference + train.acceleration_rad_s2 * slot_s);
         self.reference = if along != self.along || now < most { now } else { most };
         self.along = along;
         let slip = now - self.reference - FREE * ratings.max_speed_rad_s;
@@ -65,10 +71,17 @@ mod tests {
     /// Motoring forward and backward, braking forward and backward: torque and speed's directions.
     const WAYS: [(f32, f32); 4] = [(1.0, 1.0), (-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0)];
 
+    /// A rotor that has coasted at a mechanical speed, in rad/s.
+    fn coasting(speed: f32) -> Grip {
+        let mut grip = Grip::FULL;
+        (0..300).for_each(|_| grip.step(0.0, speed, &settings()));
+        grip
+    }
+
     #[test]
     fn a_train_on_its_rails_has_all_of_its_torque() {
         for (torque, speed) in WAYS {
-            let mut grip = Grip::FULL;
+            let mut grip = coasting(speed * 200.0);
             for slot in 0..3_000 {
                 grip.step(torque * 800.0, speed * 200.0 + torque * 19.0e-3 * slot as f32, &settings());
                 assert_eq!(grip.share(), 1.0);
@@ -79,7 +92,7 @@ mod tests {
     #[test]
     fn a_wheel_that_slips_loses_its_torque_and_gets_it_back_along_a_line() {
         for (torque, speed) in WAYS {
-            let (mut grip, mut now, mut least) = (Grip::FULL, speed * 200.0, 1.0_f32);
+            let (mut grip, mut now, mut least) = (coasting(speed * 200.0), speed * 200.0, 1.0_f32);
             for _ in 0..200 {
                 // 200 rad/s², as without any rail.
                 now += torque * 0.2;
@@ -96,6 +109,34 @@ mod tests {
                 before = grip.share();
                 slots += 1;
                 assert!(slots < 1_300, "{}", grip.share());
+            }
+        }
+    }
+
+    /// The least share of a torque's direction at a mechanical speed, in rad/s, with an angle that is off so often a turn, by so much in electrical rad, and followed
+    /// at once. Torque comes some time after the first angle.
+    fn least_share(torque: f32, speed: f32, (order, off_rad): (f32, f32)) -> f32 {
+        let settings = settings();
+        let (mut grip, mut least) = (Grip::FULL, 1.0_f32);
+        let error_rad_s = order * settings.ratings.pole_pairs * speed;
+        for slot in 0..3_000 {
+            let phase = error_rad_s * settings.slot_s * slot as f32;
+            let seen = speed + off_rad * error_rad_s / settings.ratings.pole_pairs * phase.cos();
+            grip.step(if slot < 200 { 0.0 } else { torque * 800.0 }, seen, &settings);
+            least = least.min(grip.share());
+        }
+        least
+    }
+
+    /// An angle that is off once or twice a turn is no slip at any speed at which a slot sees each half turn of its error.
+    #[test]
+    fn an_angle_that_is_off_is_no_slip() {
+        let off_rad = 3.0_f32.to_radians();
+        for (torque, speed) in WAYS {
+            for share in [0.02, 0.1, 0.3, 0.6] {
+                let speed = speed * share * settings().ratings.max_speed_rad_s;
+                let least = [1.0, 2.0].map(|order| least_share(torque, speed, (order, off_rad)));
+                assert_eq!(least, [1.0; 2], "{share}");
             }
         }
     }
@@ -119,28 +160,33 @@ mod tests {
             // The rotor jumps ahead by a slip: half of the span beyond what is free.
             let ahead = |slip: f32| speed * 200.0 + torque * slip * largest;
             let mut grip = Grip::FULL;
+            // The speed whose smoothed value is the one that is wanted.
+            let step = |grip: &mut Grip, torque_nm: f32, wanted: f32| {
+                let speed = grip.speed + (wanted - grip.speed) * (1.0 + SMOOTHED_S / settings.slot_s);
+                grip.step(torque_nm, speed, &settings);
+            };
             // What was faster before is forgotten: the reference comes down with the rotor.
             for slip in [0.1, 0.0] {
-                grip.step(torque * 800.0, ahead(slip), &settings);
+                step(&mut grip, torque * 800.0, ahead(slip));
                 assert_eq!(grip.share(), 1.0);
             }
             // Within the slot the reference follows by 0.02 rad/s.
             let followed = 20.0 * 1e-3 / largest;
-            grip.step(torque * 800.0, ahead(FREE + 0.5 * SPAN + followed), &settings);
+            step(&mut grip, torque * 800.0, ahead(FREE + 0.5 * SPAN + followed));
             let held = 1.0 - 0.5 * 1e-3 / LOSE_S;
             assert!((grip.share() - (held - 0.5)).abs() < 1e-3, "{}", grip.share());
             // As far ahead as before, the reference nearer.
-            grip.step(torque * 800.0, ahead(FREE + 0.5 * SPAN + 2.0 * followed), &settings);
+            step(&mut grip, torque * 800.0, ahead(FREE + 0.5 * SPAN + 2.0 * followed));
             let held = held - 0.5 * 1e-3 / LOSE_S;
             assert!((grip.share() - (held - 0.5)).abs() < 2e-3, "{}", grip.share());
             // Just free: all of it comes back but what is held, and that by a thousandth a slot.
-            grip.step(torque * 800.0, ahead(0.99 * FREE), &settings);
+            step(&mut grip, torque * 800.0, ahead(0.99 * FREE));
             assert!((grip.share() - (held + 1e-3 / RESTORE_S)).abs() < 1e-5, "{}", grip.share());
             // The torque's other direction has its own reference: it begins where the rotor is.
-            grip.step(-torque * 800.0, ahead(0.5), &settings);
+            step(&mut grip, -torque * 800.0, ahead(0.5));
             assert!((grip.share() - (held + 2e-3 / RESTORE_S)).abs() < 1e-5, "{}", grip.share());
             // No torque, no direction.
-            grip.step(0.0, ahead(-0.5), &settings);
+            step(&mut grip, 0.0, ahead(-0.5));
             assert!((grip.share() - (held + 3e-3 / RESTORE_S)).abs() < 1e-5, "{}", grip.share());
         }
     }

@@ -130,7 +130,7 @@ pub struct Committed {
     pub volt_seconds: Option<AlphaBeta>,
     /// Ripple flux of the pattern at the horizon, in Wb; `None` where there is none.
     pub ripple_wb: Option<AlphaBeta>,
-    /// Expected time for which the next voltage acts, in s, greater than zero: a half of the carrier, or a control period where that is longer.
+    /// Expected time for which the next voltage acts, in s, greater than zero: that of the carrier halves that are made by it.
     pub interval_s: f32,
 }
 

@@ -36,9 +36,28 @@ pub struct Reading {
     pub negate: Vec<String>,
 }
 
-/// Turns of a map's axes by half a turn, exchanges of motor and generator, and both: the quantities that change their sign.
-const MAGNET_SIGNS: [&[&str]; 4] = [&[], &["id", "psi_d"], &["id", "iq"], &["iq", "psi_d"]];
-const RELUCTANCE_SIGNS: [&[&str]; 4] = [&[], &["iq", "psi_q"], &["id", "iq"], &["id", "psi_q"]];
+/// Every way in which a map's signs may be meant, but for a mirror image, which is the same machine: a quantity that is counted the other way round, a turn of the axes
+/// by half a turn, an exchange of motor and generator. The quantities that change their sign, the fewest first.
+const MAGNET_SIGNS: [&[&str]; 8] = [
+    &[],
+    &["id"],
+    &["iq"],
+    &["psi_d"],
+    &["id", "psi_d"],
+    &["id", "iq"],
+    &["iq", "psi_d"],
+    &["id", "iq", "psi_d"],
+];
+const RELUCTANCE_SIGNS: [&[&str]; 8] = [
+    &[],
+    &["iq"],
+    &["id"],
+    &["psi_q"],
+    &["iq", "psi_q"],
+    &["id", "iq"],
+    &["id", "psi_q"],
+    &["id", "iq", "psi_q"],
+];
 
 impl Reading {
     /// The rows in the project's frame.

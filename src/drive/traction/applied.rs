@@ -142,19 +142,27 @@ pub(super) struct Wanted {
     pub revises: bool,
     /// Mean link voltage until then, in V.
     pub udc_v: f32,
+    /// Expected time for which it acts, in s.
+    pub interval_s: f32,
 }
 
-/// Expected time for which a command of a mode acts, in s: that of a half, or a control period where that is longer.
+/// Expected time for which a command of a mode acts, in s: that of the half that its boundary begins, and of those whose boundaries come while nothing newer is
+/// valid, `used_ticks` after the first. Halves are not whole parts of a control period: of 0.83 of one, a command makes one or two.
 #[inline(always)]
-pub(super) fn interval_s(mode: Mode, omega: f32, settings: &Settings) -> f32 {
+pub(super) fn interval_s(mode: Mode, omega: f32, used_ticks: i32, settings: &Settings) -> f32 {
     let Settings { clock, devices, .. } = settings;
     let shortest_s = clock.seconds(devices.shortest_half_ticks as i32);
     let half_s = match mode.carriers() {
         0 => shortest_s,
         carriers => core::f32::consts::PI / (carriers as f32 * omega.abs()),
     };
-    // A command acts for a control period at least.
-    if half_s < clock.control_s { clock.control_s } else { half_s }
+    // That time is a control period at most.
+    if half_s >= clock.control_s {
+        return half_s;
+    }
+    // A boundary at its end has the newer one already.
+    let more = clock.seconds(used_ticks - 1) / half_s;
+    half_s * (1.0 + (more as u32) as f32)
 }
 
 /// The modulator's pulses from `now`, the instant of the currents, until a command of this period can act.
@@ -163,12 +171,10 @@ pub(super) fn committed(
     pulses: &Pulses,
     now: Instant,
     steady: &Steady,
-    settings: &Settings,
+    clock: &Clock,
     wanted: &Wanted,
 ) -> Committed {
-    let Wanted { mode: decided, revises, udc_v } = *wanted;
-    let clock = &settings.clock;
-    let interval_s = interval_s(decided, steady.omega, settings);
+    let Wanted { mode: decided, revises, udc_v, interval_s } = *wanted;
     let (Some(newest), Some(last)) = (pulses.newest(), pulses.last()) else {
         return Committed { horizon_s: 0.0, volt_seconds: None, ripple_wb: None, interval_s };
     };
@@ -246,6 +252,33 @@ mod tests {
             aliases(Mode::Async, &half(13_749)) && !aliases(Mode::Async, &half(13_750)),
             "eleven are enough"
         );
+    }
+
+    /// A command acts for each half whose boundary comes before the next command is valid; at that instant the next one acts already.
+    #[test]
+    fn a_command_acts_for_the_halves_that_use_it() {
+        let clock = Clock::new(25_000_000, 2_500);
+        let devices = SwitchLimits::new(250, 0, 900.0, &clock);
+        let halves = |half_ticks: u32, used_ticks: i32| {
+            let devices = SwitchLimits { shortest_half_ticks: half_ticks, ..devices };
+            let settings = Settings::new(clock, devices);
+            let acts_s = interval_s(Mode::Async, 100.0, used_ticks, &settings);
+            (acts_s / clock.seconds(half_ticks as i32)).round() as u32
+        };
+        for (half_ticks, used_ticks, are) in [
+            (2_083, 2_500, 2),
+            (2_083, 2_084, 2),
+            (2_083, 2_083, 1),
+            (1_250, 2_500, 2),
+            (1_250, 2_501, 3),
+            (833, 2_500, 4),
+            (2_500, 2_500, 1),
+            (13_889, 2_500, 1),
+            (13_889, 0, 1),
+            (13_889, -30_000, 1),
+        ] {
+            assert_eq!(halves(half_ticks, used_ticks), are, "{half_ticks} {used_ticks}");
+        }
     }
 
     /// A pattern's ripple of a machine that turns backward is that of one that turns forward, upside down.

@@ -82,6 +82,14 @@ impl Slot {
             folds: is_short(last) && (pulses.unloaded() > 0 || is_short(pulses.before(1))),
         }
     }
+
+    /// Ticks from the boundary that uses the command, this period's or the next one's, until the command after it is valid; none or fewer where that
+    /// boundary comes later.
+    #[inline(always)]
+    pub(super) fn used_ticks(&self, clock: &Clock) -> i32 {
+        let periods = if self.commands { 2 } else { 3 };
+        self.now.after(periods * clock.control_ticks).since(self.key.boundary)
+    }
 }
 
 #[cfg(all(test, not(loom)))]

@@ -81,11 +81,17 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if let Some(last) = self.pulses.last() {
             let first_s = if slot.commands { 0.0 } else { clock.control_s };
             let horizon_s = clock.seconds(last.ends().since(slot.now));
-            let interval_s = interval_s(slot.key.mode, self.controller.omega(), &self.settings);
-            let middles_s = [0.5 * (first_s + horizon_s), horizon_s + 0.5 * interval_s];
+            let middles_s = [0.5 * (first_s + horizon_s), horizon_s + 0.5 * self.interval_s(slot)];
             let [committed_v, next_v] = self.ripple.change(first_s, middles_s);
             self.ahead = Ahead { committed_v, next_v };
         }
+    }
+
+    /// Expected time for which a command acts.
+    #[inline(always)]
+    fn interval_s(&self, slot: &Slot) -> f32 {
+        let used_ticks = slot.used_ticks(&self.settings.clock);
+        interval_s(slot.key.mode, self.controller.omega(), used_ticks, &self.settings)
     }
 
     /// The delay of the current sensors at this speed.
@@ -166,8 +172,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let steady = Steady { omega, udc_v, voltage_v: self.steady_v };
         let (mode, revises) = (slot.key.mode, self.revises);
         let committed_v = (sample.udc_v + committed_v) * self.link_scale;
-        let wanted = Wanted { mode, revises, udc_v: committed_v };
-        let committed = committed(&self.pulses, now, &steady, &self.settings, &wanted);
+        let wanted = Wanted { mode, revises, udc_v: committed_v, interval_s: self.interval_s(slot) };
+        let committed = committed(&self.pulses, now, &steady, clock, &wanted);
         let law = Law { gains, clock, tables: self.machine.tables() };
         let voltage = self.controller.regulate(here, &committed, &self.limits, &law);
         self.steady_v = voltage.steady_v;
