@@ -34,7 +34,7 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
     let summary = summary(choice, &figures, &machine)?;
     write(choice, &recording, &machine, &figures, &out)?;
     write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
-    let trip = recording.trip();
+    let trip = choice.trip(&recording);
     if options.json {
         crate::say!("{}", serde_json::to_string(&summary)?);
     } else {
@@ -100,7 +100,7 @@ pub fn write<S: System>(
         None => forget(&picture)?,
     }
     let mut page = Page::new(choice.name, &choice.title(machine));
-    page.headline(&report::headline(figures, recording.trip()));
+    page.headline(&report::headline(figures, choice.trip(recording)));
     page.carrier(machine.tables.ratings.max_switching_hz.into());
     ran(choice, machine, &mut page)?;
     if !machine.is(S::MACHINE) {

@@ -17,6 +17,7 @@ use anyhow::Result;
 use clap::{Args, Command};
 use serde::Serialize;
 use serde_json::{Map, Value};
+use tractive::protection::{Fault, Trip};
 
 /// A drive with its plant: what differs between the two.
 pub trait System: Sized + 'static {
@@ -82,6 +83,10 @@ pub trait Scenario<S: System> {
     fn trace_step_s(&self, own: &S::Own) -> f64 {
         S::trace_step_s(own)
     }
+    /// The fault that it is about, if it is about one: a run without it falls short, not with it.
+    fn fault(&self) -> Option<Fault> {
+        None
+    }
     /// The plots to draw.
     fn plots(&self, recording: &S::Recording, options: &Options<S::Own>, machine: &Machine, page: &mut Page);
 }
@@ -124,6 +129,11 @@ impl<S: System> Choice<S> {
             figures.set("lowest_id_a", recording.lowest_id_a());
         }
         figures
+    }
+
+    /// The first fault of a run, but for the one that the scenario is about.
+    pub fn trip(&self, recording: &S::Recording) -> Option<Trip> {
+        recording.trip().filter(|trip| self.scenario.fault() != Some(trip.fault))
     }
 
     /// The options with the step of the trace that the scenario takes, the source's voltage and the shortest pulse, where none was given.

@@ -9,7 +9,7 @@ use tractive::machine::Ratings;
 use tractive::operator::Request;
 use tractive::protection::Fault;
 
-/// See the module. The run ends with exit code 1, because the drive has tripped.
+/// See the module.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Acknowledge {
     /// Speed, in r/min.
@@ -18,6 +18,7 @@ pub struct Acknowledge {
 }
 
 const SPEED_RPM: f64 = 1_500.0;
+const FAULT: Fault = Fault::GateDriver;
 const FAILS_S: (f64, f64) = (1.0, 1.5);
 const CHARGE: [(f64, f64); 3] = [(0.1, 0.2), (1.35, 1.38) /* fault_not_acknowledged */, (1.9, 2.0)];
 const ENABLE: [(f64, f64); 3] = [(0.5, 1.25), (1.3, 1.33) /* fault_not_acknowledged */, (2.3, 3.0)];
@@ -45,7 +46,7 @@ impl Scenario<Traction> for Acknowledge {
         let ratings = &machine.tables.ratings;
         let line = LinePlan {
             starts_charged: true,
-            hardware: vec![(FAILS_S.0, FAILS_S.1, Fault::GateDriver)],
+            hardware: vec![(FAILS_S.0, FAILS_S.1, FAULT)],
             ..LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings)))
         };
         Plan::operated(DURATION_S, vec![(0.0, self.speed.unwrap_or(of_rated_rpm(SPEED_RPM, machine)))], line)
@@ -55,7 +56,7 @@ impl Scenario<Traction> for Acknowledge {
         let mut figures = analysis::common(recording);
         let states = line::states(recording);
         let others = states.iter().map(|entered| entered.state).ne(STATES.split(' '));
-        let named = recording.trip().is_some_and(|trip| trip.fault == Fault::GateDriver);
+        let named = recording.trip().is_some_and(|trip| trip.fault == FAULT);
         // Current flows on through the diodes until the field is empty.
         let dead = analysis::window(recording, FAILS_S.0 + 0.05, 2.3);
         let largest_a = machine.folder.parameters.max_current_a;
@@ -73,6 +74,10 @@ impl Scenario<Traction> for Acknowledge {
         line::figures(&mut figures, recording);
         figures.set("verdicts", verdicts);
         figures
+    }
+
+    fn fault(&self) -> Option<Fault> {
+        Some(FAULT)
     }
 
     fn plots(&self, recording: &Recording, _: &Options, _: &Machine, page: &mut Page) {
