@@ -150,15 +150,16 @@ impl Setup {
                 ["-m", "pip", "install", "--no-deps", "--only-binary", ":all:", &package, "--target"];
             quietly(Command::new("python3").args(install).arg(&tools));
         }
+        if !library.is_file() {
+            return false;
+        }
         if find("pkg-config").is_none() {
             self.apt_install(&["pkg-config"]);
         }
         let libs = "Libs: -L${pcfiledir}/unicorn/lib -lunicorn";
         let told_now = format!("Name: unicorn\nDescription: emulator\nVersion: {UNICORN}\n{libs}\n");
         let is_told = || std::fs::read_to_string(&told).is_ok_and(|text| text == told_now);
-        find("pkg-config").is_some()
-            && library.is_file()
-            && (is_told() || std::fs::write(&told, &told_now).is_ok())
+        find("pkg-config").is_some() && (is_told() || std::fs::write(&told, &told_now).is_ok())
     }
 
     /// CMake, with which the emulator is built.

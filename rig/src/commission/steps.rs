@@ -47,7 +47,7 @@ pub const ALL: &[Stage] = &[
     },
     Stage {
         name: "first torque",
-        asks: "The drive's image with these tables is on the board. A twentieth of the largest torque turns the free rotor for a moment, or as much as takes it to half of its largest speed.",
+        asks: "The drive's image with these tables is on the board. A twentieth of the largest torque turns the free rotor for a moment, or less, where that would take it beyond half of its largest speed.",
         run: first_torque,
     },
 ];
