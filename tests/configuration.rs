@@ -200,7 +200,7 @@ fn every_scalar_of_the_traction_drive() {
     try_all(settings, "clock.", &ticks, |settings| &mut settings.clock, check);
     let devices = fields!(SwitchLimits as SwitchLimits { min_pulse_ticks, dead_time_ticks, shortest_half_ticks | }: u32);
     try_all(settings, "devices.", devices, |settings| &mut settings.devices, check);
-    let gains = fields!(Gains as Gains { carrier, pattern_rad_s, square_damping, observer, sixth_turn_rad, resistance_doubt, link_damping | }: f32);
+    let gains = fields!(Gains as Gains { carrier, pattern_rad, square_damping, observer, sixth_turn_rad, resistance_doubt, link_damping | }: f32);
     try_all(settings, "gains.", gains, |settings| &mut settings.gains, check);
     try_all(settings, "", own, |settings| settings, check);
     let drops = fields!(traction::Drops as traction::Drops { threshold_v, slope_ohm | }: f32);
@@ -221,7 +221,7 @@ fn every_scalar_of_the_zs9() {
         carrier_ticks, dead_time_ticks | clock, gains, speed, link, link_gains, limits
     }: u32);
     try_all(settings, "", own, |settings| settings, check);
-    let gains = fields!(Gains as Gains { carrier, pattern_rad_s, square_damping, observer, sixth_turn_rad, resistance_doubt, link_damping | }: f32);
+    let gains = fields!(Gains as Gains { carrier, pattern_rad, square_damping, observer, sixth_turn_rad, resistance_doubt, link_damping | }: f32);
     try_all(settings, "gains.", gains, |settings| &mut settings.gains, check);
     let speed = fields!(SpeedDesign as SpeedDesign { inertia_kg_m2, natural_rad_s, period_s | }: f32);
     try_all(settings, "speed.", speed, |settings| &mut settings.speed, check);

@@ -138,7 +138,7 @@ fn the_page_on_the_papers_has_every_equation_table_and_figure() {
         format!("g = {} (`carrier`)", gains.carrier),
         format!("k = {} (`observer`)", gains.observer),
         format!("1/k = {} halves", (1.0 / gains.observer).round()),
-        format!("{} rad/s (`pattern_rad_s`)", gains.pattern_rad_s),
+        format!("{} rad/s with devices of 900 Hz", 900.0 * gains.pattern_rad),
         format!(
             "{} the stator's frequency (`square_damping`)",
             if gains.square_damping == 0.5 { "half" } else { "not" }

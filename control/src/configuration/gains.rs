@@ -11,7 +11,7 @@ impl Gains {
     pub const fn check(&self) -> Result<(), Refused> {
         let Self {
             carrier,
-            pattern_rad_s,
+            pattern_rad,
             square_damping,
             observer,
             sixth_turn_rad,
@@ -20,7 +20,7 @@ impl Gains {
         } = *self;
         within(&[
             Bound("gains.carrier", carrier, ABOVE_ZERO, 1.0),
-            Bound("gains.pattern_rad_s", pattern_rad_s, ABOVE_ZERO, 1e4),
+            Bound("gains.pattern_rad", pattern_rad, ABOVE_ZERO, 10.0),
             Bound("gains.square_damping", square_damping, ABOVE_ZERO, 10.0),
             Bound("gains.observer", observer, ABOVE_ZERO, 0.5),
             Bound("gains.sixth_turn_rad", sixth_turn_rad, 0.0, 3.0),

@@ -309,6 +309,7 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
             committed,
             limits,
             drop_v: self.target.current * resistance,
+            max_switching_hz: law.tables.ratings.max_switching_hz,
         };
         let current_loop::Output { voltage, steady } = current_loop::step(&input, law.gains);
         let regulates_by_pulses = limits.follows.is_direct();

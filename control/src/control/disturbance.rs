@@ -150,6 +150,7 @@ mod tests {
                     committed: &committed,
                     limits: &ModeLimits::carrier(0.9),
                     drop_v: Dq::default(),
+                    max_switching_hz: 900.0,
                 },
                 &Gains::DEFAULT,
             );

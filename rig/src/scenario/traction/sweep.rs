@@ -23,12 +23,15 @@ pub struct Sweep {
     /// Last speed, in r/min; default the machine's rated one.
     #[arg(long, value_parser = finite, allow_negative_numbers = true)]
     to: Option<f64>,
+    /// Speed's slope, in r/min a second; default an eighth of the machine's rated speed.
+    #[arg(long, value_parser = crate::options::positive)]
+    slope: Option<f64>,
 }
 
 impl Default for Sweep {
     /// As on the command line without options.
     fn default() -> Self {
-        Self { down: false, brake: false, torque_scale: 1.0, to: None }
+        Self { down: false, brake: false, torque_scale: 1.0, to: None, slope: None }
     }
 }
 
@@ -38,7 +41,8 @@ const HOLD_S: f64 = 1.0;
 impl Scenario<Traction> for Sweep {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let to_rpm = self.to.unwrap_or(machine.folder.parameters.rated_speed_rpm);
-        let ramp_s = to_rpm.abs() / of_rated_rpm(SLOPE_RPM_S, machine);
+        let slope_rpm_s = self.slope.unwrap_or(of_rated_rpm(SLOPE_RPM_S, machine));
+        let ramp_s = to_rpm.abs() / slope_rpm_s;
         let mut speed = vec![(0.0, 0.0), (ramp_s, to_rpm)];
         let mut duration_s = ramp_s + HOLD_S;
         if self.down {
