@@ -208,7 +208,7 @@ fn flaws_leave_the_switches_without_shock_and_torque_in_its_bounds() {
         "reversal --speed 6000",
         "restart",
     ];
-    // README's "current at the switches within 1.5 %, mean torque at full torque within 0.5 %".
+    // The results page's "current at the switches within 1.5 %, mean torque at full torque within 0.5 %".
     let told = [("current over the larger steady envelope", 1.5), ("mean torque error", 0.5)];
     let mut seen = 0;
     for scenario in all_at_once {

@@ -81,22 +81,22 @@ fn a_faster_carrier_and_more_shoot_through_do_better() {
     assert!(back_ms <= 12.0 && link_percent <= 0.5, "{back_ms} ms, {link_percent} %");
 }
 
-/// A line of README's table.
-fn is_in_readme(line: &str) {
-    const README: &str = include_str!("../../README.md");
-    assert!(README.lines().any(|one| one == line), "README.md has no line\n{line}");
+/// A line of the results' table.
+fn is_in_results(line: &str) {
+    const RESULTS: &str = include_str!("../../docs/results.md");
+    assert!(RESULTS.lines().any(|one| one == line), "docs/results.md has no line\n{line}");
 }
 
 #[test]
-fn the_readme_says_how_little_a_motor_feels_of_the_other() {
+fn the_results_say_how_little_a_motor_feels_of_the_other() {
     let [slow, fast] = ["", " --carrier-hz 20000 --uin 800"].map(load_step);
     let ((torque, speed, back, link), (torque_fast, speed_fast, back_fast, link_fast)) = (slow, fast);
-    is_in_readme(&format!(
+    is_in_results(&format!(
         "| motor 2's load 60 → 100 N·m: motor 1's torque moves by | {torque:.4} N·m | {torque_fast:.4} N·m |"
     ));
-    is_in_readme(&format!("| … its speed by | {speed:.5} r/min | {speed_fast:.5} r/min |"));
-    is_in_readme(&format!("| motor 2 within 0.2 % again after | {back:.1} ms | {back_fast:.1} ms |"));
-    is_in_readme(&format!("| link voltage within | ±{link:.2} % | ±{link_fast:.2} % |"));
+    is_in_results(&format!("| … its speed by | {speed:.5} r/min | {speed_fast:.5} r/min |"));
+    is_in_results(&format!("| motor 2 within 0.2 % again after | {back:.1} ms | {back_fast:.1} ms |"));
+    is_in_results(&format!("| link voltage within | ±{link:.2} % | ±{link_fast:.2} % |"));
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn motor_1_holds_while_motor_2_reverses() {
     let (torque_nm, speed_rpm) = disturbance(&with.recording, &without.recording);
     println!("{torque_nm:.4} N·m, {speed_rpm:.5} r/min");
     assert!(torque_nm <= 0.01 && speed_rpm <= 0.001, "{torque_nm} N·m, {speed_rpm} r/min");
-    is_in_readme(&format!(
+    is_in_results(&format!(
         "| motor 2 reverses: motor 1 moves by | {torque_nm:.3} N·m, {speed_rpm:.4} r/min | |"
     ));
     assert!(figure(&with, "motor2_speed_error_rms_rpm") <= 1.6);
@@ -151,7 +151,7 @@ fn the_cycle_goes_up_and_back_and_returns_energy() {
     assert!(figure(&outcome, "link_deviation_percent") < 0.5);
     let [returned, over] =
         ["returned_percent", "capacitor_overshoot_percent"].map(|name| figure(&outcome, name));
-    is_in_readme(&format!(
+    is_in_results(&format!(
         "| cycle: energy returned, capacitor overshoot | {returned:.0} %, {over:.2} % | |"
     ));
 }
