@@ -3,12 +3,12 @@
 //! * [`control`] decides the voltage: MTPA on saturated flux maps, field weakening, a current loop in flux linkage.
 //! * [`modulation`] decides the pulses of a two-level inverter: asynchronous, synchronous, middle-60° and square wave.
 //! * [`identification`] decides the voltages that show what an unknown machine is like.
-//! * [`start_up`] finds the rotor's angle if the sensor only counts.
+//! * [`start_up`] finds the angle of a rotor whose sensor only counts.
 //! * [`nine_switch`] decides the pulses of the inverter that feeds two motors.
 //! * [`machine`] holds the types of the tables made offline, [`frames`] angles and vectors, [`time`](mod@time) instants,
 //!   [`configuration`] the checks before a start.
 //!
-//! Control and modulation do not know each other; all know [`frames`], [`time`](mod@time) and [`machine`], which know none of the others.
+//! Control and modulation do not know each other; all know [`frames`], [`time`](mod@time) and [`machine`], which know none of the rest.
 //! Interrupts, the cells between them, protection and boards belong to `tractive`.
 //!
 //! # Features

@@ -117,7 +117,7 @@ impl Ratings {
     }
 }
 
-/// The largest number below a given one that is above 0.
+/// The largest number below a given one above 0.
 const fn below(value: f32) -> f32 {
     f32::from_bits(value.to_bits().saturating_sub(1))
 }

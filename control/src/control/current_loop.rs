@@ -84,7 +84,7 @@ pub struct Gains {
     pub square_damping: f32,
     /// Share of an unexplained voltage that one carrier half moves into the integral part.
     pub observer: f32,
-    /// Turn in a carrier half, in rad, up to which the integral part follows six times the stator frequency (the remainder of dead
+    /// Turn in a carrier half, in rad, up to which the integral part follows six times the stator frequency (the residue of dead
     /// time); 0: never.
     pub sixth_turn_rad: f32,
     /// Likely error of the stator's resistance, as a share of its rating, above 0 and up to 10; the larger it is, the more of the unexplained voltage
@@ -109,7 +109,7 @@ impl Gains {
     };
     /// The same without compensation of a dead time's harmonics.
     pub const WITHOUT_SIXTH: Self = Self { sixth_turn_rad: 0.0, ..Self::DEFAULT };
-    /// Percent of torque for a percent of swing that damp every line filter of 1 to 8 mH, 2 to 8 mF and 10 mΩ or more.
+    /// Percent of torque per percent of swing that damps every line filter of 1 to 8 mH, 2 to 8 mF and 10 mΩ or more.
     pub const LINE_DAMPING: f32 = 3.0;
 
     /// The gains for a dead time that is not compensated, and for a link behind a line filter.
@@ -183,8 +183,8 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
         let reach = limit * TRANSIENT_REACH;
         let holding = || input.ahead.flux.j() * input.omega + (input.drop_v - disturbance);
         let wanted = mean + input.drop_v - disturbance;
-        // Beyond what every angle has, the modulator makes what there is, in the same direction: going straight there cost the ZS9's motors 55 N·m on a map
-        // that is 20 % off, of 54 that its campaign allows.
+        // If more is asked for than every angle has, the modulator makes what there is, in the same direction: going straight there cost the ZS9's motors
+        // 55 N·m on a map that is 20 % off, of 54 that its campaign allows.
         let vector = if input.limits.index_limit > 1.0 { wanted } else { straight(wanted, holding, reach) };
         (vector, steady - disturbance, reach)
     };

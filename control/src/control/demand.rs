@@ -83,7 +83,7 @@ pub struct Input<'a> {
     pub omega: f32,
     /// Torque that flows already, in N·m: the starting point of a machine that is caught while turning.
     pub flowing_nm: f32,
-    /// `true` if a carrier follows the demand: it can step.
+    /// `true` if a carrier follows the demand: a carrier can step.
     pub can_step: bool,
     pub period_s: f32,
 }
@@ -116,7 +116,7 @@ impl Shaper {
             wanted
         };
         let largest = envelope_nm(input.omega, ratings);
-        // The link's limit is not slewed: its capacitor fills in milliseconds. A pattern follows torque towards zero at any rate.
+        // The limit by the link is not slewed: the link's capacitor fills in milliseconds. A pattern follows torque towards zero at any rate.
         let (lowest, highest) = match input.window {
             Some(window) => window.bounds_nm(input.udc_v, largest, input.omega),
             None => (-largest, largest),

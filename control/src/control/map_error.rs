@@ -1,8 +1,8 @@
 //! The difference of machine and link from what they are assumed to be, and its use.
 //!
 //! If the machine's flux linkage is ψ + Δψ, with ψ the map's, and its resistance exceeds the assumed one by ΔR, then a voltage jωΔψ + ΔR i is needed that
-//! nothing explains. It has three unknowns: ε of the whole flux linkage, m of the magnets' along d, and ΔR with what dead time and devices take along the
-//! current:
+//! nothing explains. That voltage has three unknowns: ε of the whole flux linkage, m of the magnets' along d, and ΔR with what dead time and devices take
+//! along the current:
 //!
 //! Δψ = ε ψ + m, u_d = −ωε ψ_q + ΔR i_d, u_q = ω (ε ψ_d + m) + ΔR i_q
 //!

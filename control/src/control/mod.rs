@@ -164,7 +164,7 @@ pub struct VoltageVector {
     /// The same as a vector at the sample, as if it acted there already, in V; it turns with the rotor. While the gates are off and a
     /// pattern follows, the EMF, from which the pattern starts.
     pub vector: AlphaBeta,
-    /// The vector, likewise, to which a locked carrier keeps its angle: the steady fundamental if pulses can regulate
+    /// Likewise the vector that a locked carrier keeps its angle to: the steady fundamental if pulses can regulate
     /// without it or there are none yet, the vector itself if the angle is what regulates.
     pub carrier: AlphaBeta,
     /// Fundamental of the operating point without regulation, peak phase, in V.

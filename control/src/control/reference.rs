@@ -156,7 +156,7 @@ fn weakened(torque_nm: f32, mtpa_squared: f32, at: &Electrical, tables: &Tables)
     };
     let resistance_squared = resistance * resistance;
     let largest_squared = ratings.max_current_a * ratings.max_current_a;
-    // First without torque and with the largest current; then the most torque along its slope, as its own drop leaves less flux, or
+    // First without torque and with the largest current; from there the most torque along its slope: its own drop leaves less flux, or
     // more when braking. Since the slope is the least one, the flux comes out too small rather than too large.
     let square = voltage_v * voltage_v - resistance_squared * largest_squared;
     let [_, most, slope, above, rise] = torque.at(place(square));

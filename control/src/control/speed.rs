@@ -35,7 +35,7 @@ impl SpeedTracker {
         Self { angle: Angle::ZERO, omega: 0.0, ahead_rad: 0.0, steps: 0, natural_rad_s, lost: false }
     }
 
-    /// Suits the loop to a rotor with this largest acceleration, in rad/s²: never slower than before.
+    /// Adapts the loop to a rotor with this largest acceleration, in rad/s²: no slower than before.
     pub fn quicken(&mut self, acceleration_rad_s2: f32, period_s: f32) {
         let (wanted, most) = (sqrt(acceleration_rad_s2 * (1.0 / LAG_RAD)), SAMPLED / period_s);
         let natural = if wanted < most { wanted } else { most };

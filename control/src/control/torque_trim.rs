@@ -22,7 +22,7 @@ const STEADY_RATE: f32 = 1.0;
 /// Time after a change of the demand during which the current loop is still at work, in s.
 const HOLD_S: f32 = 0.01;
 
-/// Most of a demand that a ripple may add or take: with a rotor just stopped a locked pattern's would have no end. Of sixty random machines 0.14 is the most.
+/// Most of a demand that a ripple may add or take: for a rotor just stopped, a locked pattern's would have no end. Of sixty random machines 0.14 is the most.
 const MOST_RIPPLE: f32 = 0.17;
 /// Excess of the MTPA point's voltage over six-step, as a part of it, at which no curvature is left: the iron of a machine that weakens saturates less. By the
 /// map of the 180 kW machine, from a quarter of its torque on, 0.83 to 0.56 of the MTPA point's is left at 0.06 to 0.18 beyond, and a tenth at 0.41; with the

@@ -156,7 +156,7 @@ impl Course {
         }
     }
 
-    /// The current part of the experiment.
+    /// The part of the experiment in progress.
     pub fn stage(&self) -> Stage {
         self.stage
     }

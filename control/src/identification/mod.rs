@@ -91,7 +91,7 @@ impl Identification {
         self.told.take()
     }
 
-    /// The current part of the experiment.
+    /// The part of the experiment in progress.
     pub fn stage(&self) -> Stage {
         self.course.stage()
     }

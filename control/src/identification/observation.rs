@@ -1,4 +1,4 @@
-//! The words told by an identification, one observation per carrier boundary.
+//! The words reported by an identification, one observation per carrier boundary.
 
 use crate::frames::{AlphaBeta, Dq, SinCos};
 use crate::named;

@@ -64,7 +64,7 @@ pub fn synchronous(
 }
 
 /// The share of the half for which each upper device is on, 0 ..= 1, for a voltage as a share of the link's, with a share
-/// `all_on` of the zero vectors made by all three of them: a share of half is the min-max zero sequence.
+/// `all_on` of the zero vectors made by all three of them: a share of one half is the min-max zero sequence.
 fn on_shares(voltage: AlphaBeta, all_on: f32) -> Abc {
     let phase = voltage.abc();
     let high = max(phase.a, max(phase.b, phase.c));

@@ -296,7 +296,7 @@ impl Mode {
         self.row().regulation
     }
 
-    /// `true` if its fundamental is always all that the link gives.
+    /// `true` if its fundamental is all that the link gives.
     #[inline]
     pub const fn is_whole(self) -> bool {
         matches!(self.regulation(), Regulation::Angle)

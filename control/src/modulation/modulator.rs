@@ -247,7 +247,7 @@ impl Modulator {
         first_half(self.mode, to, next_half, pulse)
     }
 
-    /// The number by which control knows the next half: a free carrier's last halves count towards the pattern's first one.
+    /// The number by which control knows the next half: a free carrier's last halves are numbered up to the pattern's first one.
     fn number(&self) -> u32 {
         #[cfg(feature = "optimal")]
         if let Some(plan) = self.plan.filter(|plan| self.joins_free(plan.to)) {

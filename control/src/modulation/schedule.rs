@@ -46,7 +46,7 @@ impl Ladder {
     #[cfg(feature = "optimal")]
     pub const OPTIMAL: Self = Self::of(&OPTIMAL_RUNGS);
 
-    /// A ladder of these modes; if there is none, the asynchronous mode serves at every frequency.
+    /// A ladder of these modes; without any, the asynchronous mode serves at every frequency.
     pub const fn of(locked: &'static [Mode]) -> Self {
         Self(locked)
     }
