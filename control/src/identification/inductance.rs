@@ -77,7 +77,7 @@ impl Inductance {
         }
     }
 
-    /// `true` until the first guess has been made.
+    /// The first guess has not been made yet.
     pub fn is_unknown(&self) -> bool {
         self.here.dd <= 0.0
     }

@@ -87,14 +87,14 @@ pub struct Applied {
     pub upper_index: f32,
     /// The lower motor's modulation index.
     pub lower_index: f32,
-    /// `true` if the upper motor has less than it asked for.
+    /// The upper motor has less than it asked for.
     pub upper_limited: bool,
-    /// `true` if the lower motor has less than it asked for.
+    /// The lower motor has less than it asked for.
     pub lower_limited: bool,
 }
 
 impl Applied {
-    /// `true` if both motors have what they asked for.
+    /// Both motors have what they asked for.
     pub const fn feasible(&self) -> bool {
         !self.upper_limited && !self.lower_limited
     }

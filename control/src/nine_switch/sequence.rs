@@ -50,9 +50,9 @@ pub(super) struct Sequence {
     pub upper_inner: f32,
     /// The part of the lower motor's zero time that is V13 and not V15, 0 ..= 1.
     pub lower_inner: f32,
-    /// `true` if both have the same zero time: the boundary slides.
+    /// Both have the same zero time: the boundary slides.
     pub slides: bool,
-    /// `true` if the shoot-through lies in the centres of V14 and V15.
+    /// The shoot-through lies in the centres of V14 and V15.
     pub central: bool,
 }
 

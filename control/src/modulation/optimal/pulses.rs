@@ -6,8 +6,8 @@ use crate::modulation::{CarrierHalf, SwitchLimits};
 
 /// Share of a half's ticks from which volt-seconds count as far off.
 const FAR_SHARE: f32 = 0.1;
-/// Part of the volt-seconds across the direction that is then made along it. Chosen by trial, for errors of any size: 0.3 leaves 231 A of 306, 0.6 190 A, 1
-/// 172 A; with 1.5 a start goes astray.
+/// Part of the volt-seconds across the direction that is then made along it. Chosen by trial, for errors of any size: 0.3 leaves 231 A of 306, 0.6 190 A,
+/// 1 172 A; with 1.5 a start goes astray.
 const LEAN: f32 = 0.5;
 
 /// One phase's part of a carrier half.
