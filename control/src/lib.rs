@@ -1,15 +1,15 @@
-//! `tractive-control`: the arithmetic of a traction drive, for use by itself.
+//! `tractive-control`: the arithmetic of a traction drive, usable on its own.
 //!
-//! * [`control`] decides which voltage: MTPA on saturated flux maps, field weakening, a current loop in flux linkage.
-//! * [`modulation`] decides which pulses of a two-level inverter: asynchronous, synchronous, middle-60° and square wave.
-//! * [`identification`] decides which voltages show what an unknown machine is like.
+//! * [`control`] decides the voltage: MTPA on saturated flux maps, field weakening, a current loop in flux linkage.
+//! * [`modulation`] decides the pulses of a two-level inverter: asynchronous, synchronous, middle-60° and square wave.
+//! * [`identification`] decides the voltages that show what an unknown machine is like.
 //! * [`start_up`] finds the angle of a rotor whose sensor only counts.
-//! * [`nine_switch`] decides which pulses of the inverter that feeds two motors.
+//! * [`nine_switch`] decides the pulses of the inverter that feeds two motors.
 //! * [`machine`] holds the types of the tables made offline, [`frames`] angles and vectors, [`time`](mod@time) instants,
 //!   [`configuration`] the checks before a start.
 //!
-//! Control and modulation never know each other; all know [`frames`], [`time`](mod@time) and [`machine`], which know nobody.
-//! Interrupts, cells between them, protection and boards are `tractive`'s.
+//! Control and modulation do not know each other; all know [`frames`], [`time`](mod@time) and [`machine`], which know none of the rest.
+//! Interrupts, the cells between them, protection and boards belong to `tractive`.
 //!
 //! # Features
 //! None is on by default.
@@ -20,8 +20,8 @@
 //! | `optimal` | the optimised pulse patterns: their modes and angles |
 //!
 //! # Conventions
-//! * Pure steps: `step(&input, &mut state) -> output`; no clock, no peripheral, no global inside.
-//! * SI units, with the unit in the name where a type does not say it (`udc_v`, `period_ticks`).
+//! * Pure steps: `step(&input, &mut state) -> output`; no clock, no peripheral and no global inside.
+//! * SI units; the name carries the unit if the type does not (`udc_v`, `period_ticks`).
 //! * d along the magnet flux, L_d < L_q; amplitude-invariant transforms, peak values, electrical angles and speeds.
 //!   Motoring forward: i_d < 0, i_q > 0.
 //! * f32 only; no heap; nothing panics, locks, or loops without a bound.

@@ -1,6 +1,6 @@
-//! Enums whose variants have names: of faults, states, schemes, as traces and documents call them.
+//! Enums with named variants: the names of faults, states and schemes as they appear in traces and documents.
 
-/// An enum with a name for each variant, from one list: a new one cannot be forgotten among all of them, nor without its name.
+/// An enum and the names of its variants, from one list: a new variant can neither be left out of the list of all nor lack a name.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! named {
@@ -11,7 +11,7 @@ macro_rules! named {
         pub enum $name { $($(#[$of])* $variant $(= $code)?,)+ }
 
         impl $name {
-            /// All of them, in the order of their codes.
+            /// All variants, in the order of their codes.
             pub const ALL: [Self; [$($text),+].len()] = [$(Self::$variant),+];
 
             /// The name in traces, in documents and on the command line.

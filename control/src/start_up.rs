@@ -1,74 +1,74 @@
-//! Initial angle at standstill: a law whose voltage pulses show where the rotor of a machine stands whose sensor only counts.
+//! Initial angle at standstill: a law whose voltage pulses show the rotor's position in a machine whose sensor only counts.
 //!
 //! 1. **Still**: the gates stay off until the sensor has counted nothing for a while.
-//! 2. **Axis**: a pulse in each of twelve directions, round after round, each followed by its opposite, which takes the flux linkage away again: each
-//!    command makes up for what the halves before it have made of theirs, as a carrier of a control period's length has one or two for a command.
-//!    With `i = A ψ + B ψ*` as complex numbers, the sum of `Δi Δψ` over all directions keeps `B`, whose angle is twice that of the d axis,
-//!    along which the inductance is least, and of `A` what pulses of unequal length leave. Dead time, offsets and saturation fall out of the sum, or do not turn it.
-//! 3. **Polarity**: magnets saturate the iron along +d, so that a pulse there takes more current than one along −d. Over all directions the currents
-//!    of the pulses add up to nothing but that. A machine without magnets has none to be found. Where the map says that the iron saturates along −d,
-//!    as the bridges of some reluctance machines do, the currents are not believed.
-//! 4. **Push**: a machine whose currents do not show it shows its polarity by turning: a current along q grows until the rotor has moved by half a degree
-//!    or so more than it drifts, and then brakes it.
+//! 2. **Axis**: pulses in twelve directions, round after round. Each pulse is followed by its opposite, which removes the flux linkage again. Each command
+//!    corrects for what the halves before it have really made, because a command acts for one or two halves of a carrier as long as a control period. With
+//!    `i = A ψ + B ψ*` as complex numbers, the sum of `Δi Δψ` over all directions keeps `B`, whose angle is twice that of the d axis (the axis of least
+//!    inductance), and of `A` only what pulses of unequal length leave. Dead time, offsets and saturation cancel in the sum or do not turn it.
+//! 3. **Polarity**: magnets saturate the iron along +d, so a pulse there takes more current than one along −d. Over all directions the pulses' currents cancel
+//!    except for that difference. A machine without magnets has no polarity to find. If the map says that the iron saturates along −d, as the bridges of some
+//!    reluctance machines do, the currents are not trusted.
+//! 4. **Push**: if the currents do not show the polarity, the rotor's motion does. A q-axis current grows until the rotor has moved by half a degree or so
+//!    more than it drifts, and then brakes the rotor.
 //!
-//! Currents and voltages are seen from the rotor: one that is heavy swings by a fraction of a degree meanwhile, one that is light by some degrees.
-//! A rotor that is turned farther begins the law anew.
+//! Currents and voltages are expressed in the rotor's frame: a heavy rotor swings by a fraction of a degree meanwhile, a light one by some degrees. If the
+//! rotor is turned farther, the law starts over.
 
 #![forbid(unsafe_code)]
 
 use crate::frames::{AlphaBeta, Angle, SinCos, sqrt};
 use crate::machine::{Ratings, Tables};
 
-/// Time for which the rotor has to stand still, in s, and what counts as still, electrical: 1°.
+/// Time for which the rotor has to stand still, in s; and the turn up to which it counts as standing still, electrical: 1°.
 const STILL_S: f32 = 0.1;
 const STILL: Angle = Angle(11_930_465);
-/// Turn that begins the law anew: 10°.
+/// Turn that makes the law start over: 10°.
 const TURNED: Angle = Angle(119_304_647);
-/// Turn that shows which way a push goes, electrical: 2°.
+/// Turn that shows the direction of a push, electrical: 2°.
 pub const PUSHED: Angle = Angle(23_860_929);
 
-/// Current along −d whose flux linkage a pulse has, as a share of the largest.
+/// Current along −d whose flux linkage a pulse reaches, as a share of the largest.
 pub const PULSE_SHARE: f32 = 0.3;
 /// Commands without voltage before the first pulse.
 const LEAD: u32 = 4;
 /// Pulses of the rounds, in twelve directions each.
 const PULSES: u32 = 96;
-/// Most commands that build up a pulse.
+/// Most commands for building up a pulse.
 const LONGEST: f32 = 32.0;
 
 /// Growth of a push's current along q, in shares of the largest per s; and the longest time of a push, in s.
 pub const PUSH_GROWTH_HZ: f32 = 1.0;
 const PUSH_S: f32 = 0.5;
-/// Time without current in which the drift before a push shows, in s.
+/// Time without current that shows the drift before a push, in s.
 const REST_S: f32 = 0.02;
-/// Length of the brake's memory of the turn as a share of the push's; what is left of [`PUSHED`] beyond that memory where the rotor stands again, and the
-/// most of the push's lengths until then.
+/// Length of the brake's memory of the turn, as a share of the push's length; the part of [`PUSHED`] beyond that memory at which the rotor counts as standing
+/// again; and the longest time until then, in push lengths.
 const BRAKE_SHARE: f32 = 0.25;
 const BRAKED: Angle = Angle(PUSHED.0 / 64);
 const BRAKES: u32 = 4;
-/// Share of the push's last current with which a turn of [`PUSHED`] beyond that memory is braked. A push `k t` takes `t` to `θ = k t³/6`; a rotor that is braked
-/// by `g` times its turn beyond a memory of length `T` does not swing up to `g = 1/4T²`, in units of its acceleration, which is ⅔ of `k t` over `θ` for a quarter of `t`.
+/// Share of the push's last current that brakes a turn of [`PUSHED`] beyond that memory. A push `k t` takes `t` to `θ = k t³/6`; a rotor braked by `g` times
+/// its turn beyond a memory of length `T` does not swing up to `g = 1/4T²`, in units of its acceleration: for a quarter of `t`, ⅔ of `k t` over `θ`.
 const BRAKE_GAIN: f32 = 2.0 / 3.0;
-/// Share of the way to a push's current that a command goes, by the mean of both axes' inverse inductances.
+/// Share of the way to a push's current that one command covers, by the mean of both axes' inverse inductances.
 const LEAD_SHARE: f32 = 0.2;
-/// Share of that which later commands keep, for what resistance and devices take.
+/// Share of that voltage which later commands keep, for the drop of resistance and devices.
 const HELD_SHARE: f32 = 0.1;
 
-/// Ratio `B` over `A`, (L_q − L_d)/(L_q + L_d) of the inductances, from which there is an axis.
+/// Least ratio `B` over `A`, (L_q − L_d)/(L_q + L_d) of the inductances, at which there is an axis.
 pub const SALIENT: f32 = 0.03;
 /// Share of the currents' way along the pulses that shows the polarity.
 const POLAR_SHARE: f32 = 0.02;
-/// Share by which the map's iron may saturate along −d more than along +d.
+/// Share by which the map's iron may saturate more along −d than along +d.
 const BENT_SHARE: f32 = 0.02;
 
-/// Everything that a command is made of.
+/// The inputs of a command.
 #[derive(Clone, Copy, Debug)]
 pub struct StartUpInput<'a> {
     /// Largest voltage, peak phase, in V.
     pub limit_v: f32,
     /// Time for which a command acts, in s, greater than zero.
     pub interval_s: f32,
-    /// Volt-seconds from the last boundary that was observed until the command acts, in V·s.
+    /// Volt-seconds from the last observed boundary until the command acts, in V·s.
     pub committed: AlphaBeta,
     /// The machine.
     pub tables: &'a Tables,
@@ -81,16 +81,16 @@ pub enum StartUpStep {
     Wait,
     /// This voltage, peak phase, in V.
     Pulse(AlphaBeta),
-    /// The electrical angle that the rotor had where its sensor began to count. Gates off.
+    /// The electrical angle that the rotor had when its sensor began to count. Gates off.
     Found(Angle),
-    /// There is no axis, or no polarity, to be found. Gates off.
+    /// No axis or no polarity can be found. Gates off.
     Failed,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Still,
-    /// No voltage while the gates come on.
+    /// No voltage while the gates switch on.
     Lead,
     Axis,
     Rest,
@@ -102,28 +102,28 @@ enum Stage {
 #[derive(Clone, Copy, Debug)]
 pub struct StartUp {
     stage: Stage,
-    /// Time that the rotor has stood still, in s; turn where it stood, and now.
+    /// Time for which the rotor has stood still, in s; its turn at the beginning of that time, and now.
     still_s: f32,
     from: Angle,
     turned: Angle,
-    /// Turn where this stage began, or the brake's memory of it.
+    /// Turn at the beginning of this stage, or the brake's memory of it.
     stage_from: Angle,
-    /// Commands of this pulse, push or rest; and pulses.
+    /// Number of commands in this pulse, push or rest; number of pulses.
     commands: u32,
     pulses: u32,
-    /// Turn of a command by which the rotor drifts before the push, in units of [`Angle`]; commands of the push, and whether it went backward.
+    /// The rotor's drift in one command before the push, in units of [`Angle`]; the push's number of commands, and whether it went backward.
     drift: i32,
     pushed: u32,
     against: bool,
     /// Voltage that holds the push's current, in V.
     held_v: AlphaBeta,
-    /// Commands that build the pulse up, and its flux linkage in Wb.
+    /// Number of commands that build up the pulse, and its flux linkage in Wb.
     halves: u32,
     pulse_wb: f32,
     /// Current at the last boundary, in A; and the volt-seconds of all halves until then, in V·s.
     before: AlphaBeta,
     flux: AlphaBeta,
-    /// Sums over the boundaries with a flux linkage: `Δi Δψ`, `Δψ Δψ`, `Δi·Δψ`, `Δψ²`, currents and flux linkages of the pulses; and how many they are.
+    /// Sums over the boundaries with a flux linkage: `Δi Δψ`, `Δψ Δψ`, `Δi·Δψ`, `Δψ²`, currents and flux linkages of the pulses; and their number.
     salient: AlphaBeta,
     uneven: AlphaBeta,
     round: f32,
@@ -131,12 +131,12 @@ pub struct StartUp {
     polar: AlphaBeta,
     pulsed: AlphaBeta,
     count: f32,
-    /// Electrical angle of the axis where `from` is.
+    /// Electrical angle of the axis when the rotor is at `from`.
     axis: Angle,
 }
 
 impl StartUp {
-    /// Before the first command.
+    /// The state before the first command.
     pub const fn new() -> Self {
         const NONE: AlphaBeta = AlphaBeta { alpha: 0.0, beta: 0.0 };
         Self {
@@ -171,7 +171,7 @@ impl StartUp {
         self.stage == Stage::Still
     }
 
-    /// Takes the current at a carrier boundary, in A, and the volt-seconds since the last one, in V·s; `None` where they are not known.
+    /// Takes the current at a carrier boundary, in A, and the volt-seconds since the last one, in V·s; `None` if they are not known.
     pub fn observe(&mut self, current: AlphaBeta, volt_seconds: Option<AlphaBeta>) {
         let change = current - self.before;
         let twice = current + self.before;
@@ -194,7 +194,7 @@ impl StartUp {
         }
     }
 
-    /// Takes the turn of the rotor since its sensor began to count, electrical, `passed_s` after the last one.
+    /// Takes the rotor's electrical turn since its sensor began to count, `passed_s` after the last one.
     pub fn turn(&mut self, turned: Angle, passed_s: f32) {
         self.still_s += passed_s;
         self.turned = turned;
@@ -236,15 +236,15 @@ impl StartUp {
         self.commands += 1;
         let built =
             if self.commands <= self.halves { self.commands } else { 2 * self.halves - self.commands };
-        // Of four directions at right angles one, its opposite, and the others, so that the torques of magnets and of saliency fall out of each
-        // four; and then the same 30° further.
+        // Four directions at right angles: one, its opposite, then the other two, so that the torques of magnets and of saliency cancel in each
+        // four; then the same 30° further.
         let turned = (self.pulses >> 2).wrapping_mul(Angle::DEG_30.0);
         let across = if self.pulses & 2 == 0 { Angle::ZERO } else { Angle::DEG_90 };
         let direction = Angle(turned ^ self.pulses << 31) + across;
         self.steer(along(direction) * (self.pulse_wb * built as f32 / self.halves as f32), input)
     }
 
-    /// The voltage that makes the halves' volt-seconds so many since the start, in V·s.
+    /// The voltage that brings the halves' volt-seconds since the start to the wanted ones, in V·s.
     fn steer(&self, wanted: AlphaBeta, input: &StartUpInput) -> StartUpStep {
         let voltage = (wanted - self.flux - input.committed) * (1.0 / input.interval_s);
         let most = input.limit_v / (sqrt(voltage.squared()) + f32::MIN_POSITIVE);
@@ -258,7 +258,7 @@ impl StartUp {
         // `A` and `B`, from the sums of `Δi Δψ* = A Δψ Δψ* + B Δψ* Δψ*`, of which `round` is the real part, and of `Δi Δψ = A Δψ Δψ + B Δψ* Δψ`.
         let a = (round - salient.dot(uneven)) / (1.0 - uneven.squared());
         let b = salient - uneven * a;
-        // Not a number is no axis.
+        // NaN is no axis.
         let has_axis = sqrt(b.squared()) > SALIENT * a;
         if !has_axis {
             return Some(StartUpStep::Failed);
@@ -267,7 +267,7 @@ impl StartUp {
         if !tables.ratings.has_magnets() {
             return Some(self.found(false));
         }
-        // Less what pulses that are longer one way than the other leave by themselves.
+        // Less what pulses that are longer one way than the other contribute by themselves.
         let mirrored = AlphaBeta { beta: -self.pulsed.beta, ..self.pulsed };
         let polar = self.polar - self.pulsed * a - times(b, mirrored);
         let polar_a = polar.park(self.axis.sin_cos()).d;
@@ -284,7 +284,7 @@ impl StartUp {
         (self.stage, self.commands, self.pulses, self.stage_from) = (stage, 0, 0, self.turned);
     }
 
-    /// A command of the push, of the rest before it or of the brake after it.
+    /// One command of the push, of the rest before it or of the brake after it.
     fn push(&mut self, input: &StartUpInput) -> StartUpStep {
         let moved = self.turned - self.stage_from;
         self.commands += 1;
@@ -327,18 +327,18 @@ impl StartUp {
         StartUpStep::Pulse(led_v + self.held_v)
     }
 
-    /// Found, with d along the axis or against it.
+    /// The result, with d along the axis or against it.
     fn found(&self, against: bool) -> StartUpStep {
         StartUpStep::Found(Angle((self.axis - self.from).0 ^ u32::from(against) << 31))
     }
 }
 
-/// The error of a rotor's angle that matters: of a machine without magnets not the half turn in it.
+/// The part of a rotor angle's error that matters: for a machine without magnets a half turn does not.
 pub const fn axis_error(ratings: &Ratings, error: Angle) -> Angle {
     if ratings.has_magnets() { error } else { Angle(((error.0 << 1) as i32 >> 1) as u32) }
 }
 
-/// By how much the pulses' current along −d takes the flux linkage down, and along +d up, in Wb.
+/// Decrease of the flux linkage by the pulses' current along −d and increase by their current along +d, in Wb.
 #[inline(never)]
 fn along_d_wb(tables: &Tables) -> (f32, f32) {
     let current_a = PULSE_SHARE * tables.ratings.max_current_a;
@@ -352,13 +352,13 @@ fn psi_d_wb(tables: &Tables, id_a: f32) -> f32 {
     tables.flux.at(id_a, 0.0)[0]
 }
 
-/// `true` of a map whose iron saturates along −d rather than +d.
+/// `true` for a map whose iron saturates along −d rather than +d.
 fn saturates_backward(tables: &Tables) -> bool {
     let (down_wb, up_wb) = along_d_wb(tables);
     up_wb > (1.0 + BENT_SHARE) * down_wb
 }
 
-/// Commands that build a pulse up, and its flux linkage in Wb.
+/// Number of commands that build up a pulse, and its flux linkage in Wb.
 fn pulse(input: &StartUpInput) -> (u32, f32) {
     let (pulse_wb, _) = along_d_wb(input.tables);
     let most_wb = input.limit_v * input.interval_s;

@@ -1,4 +1,4 @@
-//! Time in whole ticks of the timers' clock. Instants wrap; differences of instants less than half the range
+//! Time in whole ticks of the timers' clock. Instants wrap; differences between instants less than half the range
 //! apart (86 s at 25 MHz) do not.
 
 #![forbid(unsafe_code)]
@@ -57,7 +57,7 @@ impl Clock {
         Self { tick_s, ticks_per_s: hz as f32, control_ticks, control_s: control_ticks as f32 * tick_s }
     }
 
-    /// The control rate for devices of a highest switching frequency, in Hz, unless another is asked for: 10 kHz, or 20 kHz where a
+    /// The control rate for devices with a given highest switching frequency, in Hz, unless another rate is asked for: 10 kHz, or 20 kHz if a
     /// carrier would otherwise have less than one command.
     pub const fn control_hz(max_switching_hz: f32) -> u32 {
         const USUAL_HZ: u32 = 10_000;
@@ -70,13 +70,13 @@ impl Clock {
         ticks as f32 * self.tick_s
     }
 
-    /// Angle units per tick of an electrical angular speed in rad/s.
+    /// Angle units per tick at an electrical angular speed in rad/s.
     #[inline]
     pub fn angle_rate(&self, omega: f32) -> f32 {
         omega * (UNITS_PER_RADIAN * self.tick_s)
     }
 
-    /// Control periods in a millisecond: the nearest whole number, 1 at least.
+    /// Control periods in a millisecond: the nearest whole number, at least 1.
     #[inline]
     pub const fn millisecond_periods(&self) -> u32 {
         let control_ticks = if self.control_ticks > 0 { self.control_ticks } else { 1 };

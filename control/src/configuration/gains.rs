@@ -7,7 +7,7 @@ impl Gains {
     /// The check of the gains by themselves.
     ///
     /// # Errors
-    /// The first scalar that does not.
+    /// The first scalar that does not pass.
     pub const fn check(&self) -> Result<(), Refused> {
         let Self {
             carrier,

@@ -4,7 +4,7 @@ use super::{ABOVE_ZERO, Bound, ROUNDING, Refused, checked, within};
 use crate::machine::{Curve, Grid, Mtpa, Ratings, Tables, Weakening};
 use core::f32::consts::FRAC_2_PI;
 
-/// The largest ratio of a trip level to its limit: farther it protects nothing.
+/// The largest ratio of a trip level to its limit: beyond it the trip level protects nothing.
 const TRIP_CURRENT: f32 = 4.0;
 const TRIP_OTHERS: f32 = 3.0;
 /// Full torque in 1 ms at the quickest, in 100 s at the slowest.
@@ -18,7 +18,7 @@ impl Ratings {
     /// The check of the ratings, by themselves and together.
     ///
     /// # Errors
-    /// The first scalar that does not.
+    /// The first scalar that does not pass.
     pub const fn check(&self) -> Result<(), Refused> {
         let Self {
             pole_pairs,
@@ -66,7 +66,7 @@ impl Ratings {
         self.check_together()
     }
 
-    /// The same, together.
+    /// The check of the ratings together.
     const fn check_together(&self) -> Result<(), Refused> {
         let Self {
             pole_pairs,
@@ -117,7 +117,7 @@ impl Ratings {
     }
 }
 
-/// The largest number below one that is above 0.
+/// The largest number below a given one above 0.
 const fn below(value: f32) -> f32 {
     f32::from_bits(value.to_bits().saturating_sub(1))
 }
@@ -137,13 +137,13 @@ impl Axis {
         within(&[
             Bound(count_name, count as f32, NODES.0, NODES.1),
             Bound(first_name, first, self.first.0, self.first.1),
-            // The last node lies where it may.
+            // The last node lies where it is allowed to.
             Bound(step_name, inverse_step, steps / (most - first), steps / (least - first)),
         ])
     }
 }
 
-/// As many nodes as there are said to be, every one a number.
+/// As many nodes as stated, every one a number.
 const fn nodes<const N: usize>(
     name: &'static str,
     nodes: &[[f32; N]],
@@ -167,7 +167,7 @@ impl Tables {
     /// The check of ratings and tables, by themselves and together.
     ///
     /// # Errors
-    /// The first scalar that does not.
+    /// The first scalar that does not pass.
     pub const fn check(&self) -> Result<(), Refused> {
         // The network belongs to one inverter alone, whose drive checks what it makes of it.
         let Self { name: _, ratings, flux, mtpa, weakening, z_source: _ } = self;

@@ -1,8 +1,8 @@
 //! The checks of a configuration at start-up: whatever made it, a drive does not start with a scalar that makes no sense.
 //!
-//! Each `check` takes its structure apart whole, so that a new field does not compile before it is checked. First every scalar by
-//! itself, then how they stand to each other; the first that is wrong is told by its name. What passes divides nothing by zero. The
-//! checks are constant functions: what an image holds as constants its compiler checks.
+//! Each `check` takes its structure apart completely, so that a new field does not compile before it is checked. First every scalar is checked by
+//! itself, then their relations; the first wrong one is reported by its name. A configuration that passes divides nothing by zero. The
+//! checks are constant functions: the compiler checks what an image holds as constants.
 
 #![forbid(unsafe_code)]
 
@@ -40,7 +40,7 @@ pub const ROUNDING: f32 = 1e-3;
 /// A scalar by its name, its value, and the least and the most that it may be.
 pub struct Bound(pub &'static str, pub f32, pub f32, pub f32);
 
-/// The first scalar out of its bounds. What is not a number is out of any.
+/// The first scalar out of its bounds. NaN is out of any bounds.
 pub const fn within(bounds: &[Bound]) -> Result<(), Refused> {
     let mut rest = bounds;
     while let [Bound(name, value, least, most), others @ ..] = rest {
@@ -52,7 +52,7 @@ pub const fn within(bounds: &[Bound]) -> Result<(), Refused> {
     Ok(())
 }
 
-/// Leaves a constant function with what a check has refused: `?`, which such a function has not.
+/// Returns from a constant function what a check has refused: the `?` that such a function lacks.
 #[macro_export]
 macro_rules! checked {
     ($check:expr) => {

@@ -1,28 +1,28 @@
-//! Errors of a position sensor that go once and twice with the electrical angle, as a resolver's do: learnt from what the speed tracker leaves
-//! of them, and taken out.
+//! Errors of a position sensor that repeat once and twice with the electrical angle, as a resolver's do: learnt from what the speed tracker leaves of them,
+//! and removed.
 //!
-//! A rotor whose torque ripples little for its inertia turns evenly, so what goes once or twice with its angle is the sensor's. Of an error that turns with ω the tracker, whose
-//! natural frequency is ω₀, follows a part: what it leaves, E, is that of an error D = E (1 − (ω₀/ω)² − 2j ω₀/ω). Over some whole turns of even
-//! speed E is the mean of what is left times 2 e^(−jkθ), and of D half is added to what is known: the error goes away in some of these times whatever
-//! noise, lag and acceleration are, and nothing is fed back faster than it was measured.
+//! A rotor with little torque ripple for its inertia turns evenly, so an error that repeats once or twice with its angle is the sensor's. The tracker, whose
+//! natural frequency is ω₀, follows a part of an error that turns with ω: the remainder E is that of an error D = E (1 − (ω₀/ω)² − 2j ω₀/ω). Over some whole
+//! turns of even speed E is the mean of the remainder times 2 e^(−jkθ), and half of D is added to what is known: the error goes away in some of these times
+//! whatever noise, lag and acceleration are, and nothing is fed back faster than it was measured.
 
 use super::speed::SpeedTracker;
 use crate::frames::{Angle, SinCos, limit_magnitude};
 
 /// Turns over which the error is measured, as a number of bits: four.
 const TURNS_BITS: u32 = 2;
-/// Speed from which an error is learnt, over the tracker's natural frequency: below it the tracker follows most of it.
+/// Speed from which an error is learnt, over the tracker's natural frequency: below it the tracker follows most of the error.
 const FROM: f32 = 0.4;
 /// Change of the speed over these turns up to which it counts as even, as a share.
 const EVEN: f32 = 0.02;
-/// Share of a measured error that is added to what is known.
+/// Share of a measured error that is added to the known one.
 const GAIN: f32 = 0.5;
-/// Error that is known and left alone, as the root of the sum of squares, in rad: 0.1°, which an encoder's counts may look like. It is half of the error,
-/// for the half that is added first.
+/// Known error that is left alone, as the root of the sum of squares, in rad: 0.1°, which an encoder's counts may look like. It is half of the error,
+/// because half is added first.
 const LEFT_ALONE_RAD: f32 = 1.745e-3;
-/// Largest step by which what is known of a part may change, in rad: less than what counts as an angle that is lost.
+/// Largest step of the known value of a part, in rad: less than what counts as a lost angle.
 const MOST_STEP_RAD: f32 = 0.02;
-/// Largest error that is taken out, of each part, in rad.
+/// Largest error that is removed, of each part, in rad.
 const MOST_RAD: f32 = 0.1;
 
 /// Amplitudes of the cosine and the sine of a multiple of the angle, in rad.
@@ -41,19 +41,19 @@ impl Part {
         self.cos * direction.cos + self.sin * direction.sin
     }
 
-    /// One more sample of what is left, in rad.
+    /// One more sample of the remainder, in rad.
     #[inline(always)]
     fn add(&mut self, left_rad: f32, direction: SinCos) {
         self.cos += left_rad * direction.cos;
         self.sin += left_rad * direction.sin;
     }
 
-    /// The same part seen from an angle before, so many times the angle that lies between.
+    /// The same part seen from an earlier angle, by so many times the angle between them.
     fn turned_back(self, by: SinCos) -> Self {
         Self { cos: self.cos * by.cos + self.sin * by.sin, sin: self.sin * by.cos - self.cos * by.sin }
     }
 
-    /// Learns from the means of what is left times cosine and sine, each by half, where the tracker's natural frequency is `ratio` times that of this part.
+    /// Learns from the means of the remainder times cosine and sine, half of each, with the tracker's natural frequency `ratio` times that of this part.
     fn learn(&mut self, mean: Self, ratio: f32) {
         let (real, imaginary) = (1.0 - ratio * ratio, 2.0 * ratio);
         let gain = 2.0 * GAIN;
@@ -64,26 +64,26 @@ impl Part {
     }
 }
 
-/// The errors of once and twice the angle that are known, and what is being measured of them.
+/// The known errors of once and twice the angle, and their measurement in progress.
 #[derive(Clone, Copy, Debug)]
 pub struct AngleHarmonics {
-    /// By how long the angles that are observed are ahead of the sensor's, in s.
+    /// Lead of the observed angles over the sensor's, in s.
     ahead_s: f32,
     known: [Part; 2],
-    /// Sums of what was left, times cosine and sine, and how many samples they are of.
+    /// Sums of the remainder times cosine and sine, and their number of samples.
     sums: [Part; 2],
     samples: u32,
-    /// Way that the angle has gone since these began: a turn is 2³² over the turns of a measurement.
+    /// Way of the angle since these began: a turn is 2³² over the turns of a measurement.
     way: u32,
     last: Angle,
-    /// Electrical speed where they began, in rad/s; 0 where that was no beginning.
+    /// Electrical speed at their beginning, in rad/s; 0 if that was no valid beginning.
     omega: f32,
-    /// `true` if what is known is worth taking out.
+    /// `true` if the known errors are worth removing.
     used: bool,
 }
 
 impl AngleHarmonics {
-    /// Nothing known, of a sensor whose angles are brought forward by so long before they are observed, in s.
+    /// Nothing known, for a sensor whose angles are brought forward by this time before they are observed, in s.
     pub const fn new(ahead_s: f32) -> Self {
         const NONE: [Part; 2] = [Part::NONE; 2];
         Self {
@@ -98,7 +98,7 @@ impl AngleHarmonics {
         }
     }
 
-    /// A measured angle without what is known of its errors.
+    /// A measured angle without the known errors.
     #[inline(always)]
     pub fn corrected(&self, measured: Angle) -> Angle {
         if self.used { self.without(measured) } else { measured }
@@ -108,32 +108,32 @@ impl AngleHarmonics {
     fn without(&self, measured: Angle) -> Angle {
         let there = measured.sin_cos();
         let error_rad = self.error_rad(there);
-        // The errors are those of the true angle, which the first look comes near.
+        // The errors depend on the true angle, which the first look approximates.
         let back = SinCos { sin: -error_rad, cos: 1.0 - 0.5 * error_rad * error_rad };
         measured - Angle::within_half_turn(self.error_rad(there.turned(back)))
     }
 
-    /// The error that is known in a direction, in rad.
+    /// The known error in a direction, in rad.
     #[inline(always)]
     fn error_rad(&self, once: SinCos) -> f32 {
         let [first, second] = self.known;
         first.at(once) + second.at(once.turned(once))
     }
 
-    /// `true` if the speed is not far below that from which errors are learnt: they move the tracker's speed, too.
+    /// `true` if the speed is not far below that from which errors are learnt: the errors move the tracker's speed, too.
     #[inline(always)]
     pub fn can_observe(tracker: &SpeedTracker) -> bool {
         tracker.omega().abs() > 0.5 * FROM * tracker.natural_rad_s()
     }
 
-    /// Nothing is learnt for a while: what begins anew is no measurement before the next whole turns.
+    /// Learns nothing for a while: sums that begin anew are no measurement before the next whole turns.
     #[inline(always)]
     pub fn pause(&mut self) {
         self.omega = 0.0;
     }
 
-    /// A control period: the corrected angle, brought forward, and its direction, and by how much it was off what the tracker expected, in rad. Periods may be left
-    /// out, a half turn of the angle at most.
+    /// Takes a control period: the corrected angle, brought forward, its direction, and its difference from what the tracker expected, in rad. Periods may be
+    /// left out for a half turn of the angle at most.
     #[inline(never)]
     pub fn observe(&mut self, angle: Angle, direction: SinCos, left_rad: f32, tracker: &SpeedTracker) {
         let [once, twice] = &mut self.sums;
@@ -149,7 +149,7 @@ impl AngleHarmonics {
         }
     }
 
-    /// Both parts as they are of the sensor's own angles.
+    /// Both parts as functions of the sensor's own angles.
     #[inline(always)]
     fn sensed(&self, once: Part, twice: Part, omega: f32) -> (Part, Part) {
         if self.ahead_s == 0.0 {
@@ -159,7 +159,7 @@ impl AngleHarmonics {
         (once.turned_back(ahead), twice.turned_back(ahead.turned(ahead)))
     }
 
-    /// The turns are whole.
+    /// Ends a measurement: the turns are whole.
     #[cold]
     #[inline(never)]
     fn end(&mut self, tracker: &SpeedTracker) {
@@ -173,7 +173,7 @@ impl AngleHarmonics {
         if even && omega.abs() > FROM * natural {
             let (once, twice) = self.sensed(once, twice, omega);
             let ratio = natural / omega;
-            // What is not taken out is all in what was left.
+            // An error that is not removed is all in the remainder.
             if !self.used {
                 self.known = [Part::NONE; 2];
             }
@@ -197,7 +197,7 @@ mod tests {
     const AHEAD_S: f32 = 5e-4;
     const ERROR_RAD: [(f32, f32); 2] = [(0.052, 0.7), (0.017, -2.0)];
 
-    /// Errors of the corrected angle in rad over the last tenth of so many seconds at an electrical speed that changes by so many rad/s²; observed
+    /// Errors of the corrected angle in rad over the last tenth of so many seconds, at an electrical speed that changes by so many rad/s²; observed
     /// once in 30°, as with the carrier halves of the fewest pulses.
     fn left(omega: f64, slope: f64, seconds: f64, errors: [(f32, f32); 2]) -> Vec<f32> {
         let (mut harmonics, mut tracker) = (AngleHarmonics::new(AHEAD_S), SpeedTracker::new());
@@ -264,7 +264,7 @@ mod tests {
         assert!(left_rad < 0.35, "{left_rad} rad");
     }
 
-    /// A tracker that has seen two angles half a radian apart, in so long a time: its speed is theirs.
+    /// A tracker that has seen two angles half a radian apart in this time: its speed is theirs.
     fn tracker(period_s: f32, natural_rad_s: f32) -> SpeedTracker {
         let mut tracker = SpeedTracker::with_natural(natural_rad_s);
         for rad in [0.0, 0.5] {

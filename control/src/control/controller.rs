@@ -1,7 +1,7 @@
 //! The control law's state, and its stages.
 //!
-//! Nothing is computed that nobody uses: each control period follows the rotor and takes its sample into the mean torque; the
-//! operating point is made once for each command or for some that are near each other, and the voltage once for each.
+//! Nothing is computed without need: each control period follows the rotor and takes its sample into the mean torque. The
+//! operating point is made once for each command or once for several that are close together; the voltage is made once for each command.
 
 use super::speed::SpeedTracker;
 use super::{
@@ -14,8 +14,8 @@ use crate::frames::{Angle, Dq, six_step_v};
 use crate::machine::Tables;
 use crate::time::Clock;
 
-/// Assumed addition of the trim and of the link's damping to an MTPA point's voltage, as shares of six-step and of the largest torque. Chosen by trial: by the maps of the
-/// 180 kW machine it adds 0.55 at half torque and 0.76 at full torque; with none the mode hunts on a wrong map.
+/// Assumed increase of an MTPA point's voltage by the trim and the link's damping, as shares of six-step and of the largest torque. Chosen by trial: by the
+/// maps of the 180 kW machine the increase is 0.55 at half torque and 0.76 at full torque; with none the mode hunts if the map is wrong.
 const DEPTH_PER_TORQUE: f32 = 0.4;
 
 /// Time constant of the torque that is told, in s: half of telemetry's period.
@@ -33,15 +33,15 @@ pub struct Target {
     pub flux: Dq,
     /// The source of the reference.
     pub region: Region,
-    /// Fundamental that the MTPA point asks for at this speed, as a share of six-step on the link's slow value. Without what the torque's
-    /// trim adds, which is each mode's own, and without what the link's damping adds: a mode chosen by them would not last.
+    /// Fundamental that the MTPA point asks for at this speed, as a share of six-step on the link's slow value. It excludes the additions of the torque's
+    /// trim, which differ from mode to mode, and of the link's damping: a mode chosen by them would not last.
     pub modulation_index: f32,
     /// Largest fundamental that may be made, peak phase, in V.
     pub voltage_limit_v: f32,
 }
 
 impl Target {
-    /// While no pulses are made.
+    /// The target while no pulses are made.
     pub const NONE: Self = Self {
         torque_nm: 0.0,
         current: Dq { d: 0.0, q: 0.0 },
@@ -52,22 +52,22 @@ impl Target {
     };
 }
 
-/// Everything that an operating point is made of.
+/// The inputs of an operating point.
 #[derive(Clone, Copy, Debug)]
 pub struct AimInput<'a> {
     /// The operator's demand.
     pub demand: &'a Demand,
-    /// The window of link voltage in which it ends; `None`: nowhere.
+    /// The window of link voltage within which torque is given; `None`: no limit.
     pub window: Option<&'a LinkWindow>,
-    /// DC-link voltage as it is read, in V.
+    /// Measured DC-link voltage, in V.
     pub udc_v: f32,
-    /// By how much the link is expected to be above that where the voltage will act, in V.
+    /// Expected rise of the link above that by the time the voltage acts, in V.
     pub change_v: f32,
-    /// The link's voltage over that, as far as the drive makes use of [`ControlLaw::link_scale`] for its volt-seconds; 1: it makes none.
+    /// The link's voltage over that, as far as the drive uses [`ControlLaw::link_scale`] for its volt-seconds; 1 if it does not.
     pub link_scale: f32,
-    /// The link's swing, where it is to be damped.
+    /// The link's swing, if it is to be damped.
     pub swing: Option<LinkSwing>,
-    /// The share of the machine's iron loss that is made up for, 0 ..= 1: torque is then the rotor's, not the air gap's. The papers' ordinary law
+    /// The share of the machine's iron loss that is compensated, 0 ..= 1: torque is then the rotor's, not the air gap's. The papers' ordinary law
     /// knows nothing of it.
     pub iron_share: f32,
     /// The limits of the mode.
@@ -75,14 +75,14 @@ pub struct AimInput<'a> {
 }
 
 impl<'a> AimInput<'a> {
-    /// A demand on a link that stands still, with no window, no damping, and no iron loss to be made up for.
+    /// A demand on a constant link, without a window, damping or compensation of iron loss.
     pub const fn plain(demand: &'a Demand, udc_v: f32, limits: &'a ModeLimits) -> Self {
         let (window, swing) = (None, None);
         Self { demand, window, udc_v, change_v: 0.0, link_scale: 1.0, swing, iron_share: 0.0, limits }
     }
 }
 
-/// The control law's state between two control periods; of a drive whose samples have the ripple of their currents, unless `RIPPLE` is `false`.
+/// The control law's state between two control periods, for a drive whose samples contain the ripple of their currents unless `RIPPLE` is `false`.
 #[derive(Clone, Copy, Debug)]
 pub struct Controller<const RIPPLE: bool = true> {
     speed: SpeedTracker,
@@ -92,7 +92,7 @@ pub struct Controller<const RIPPLE: bool = true> {
     link: link_filter::LinkFilter,
     path: flux_path::FluxPath,
     map_error: map_error::MapError,
-    /// Torque by the map, summed over the samples since the last operating point, in N·m; and how many they are.
+    /// Torque by the map, summed over the samples since the last operating point, in N·m; and their number.
     sum_nm: f32,
     samples: u32,
     /// That torque, smoothed, in N·m.
@@ -103,14 +103,14 @@ pub struct Controller<const RIPPLE: bool = true> {
 }
 
 impl Controller {
-    /// At rest, with nothing known of the machine's angle.
+    /// A controller at rest that knows nothing of the machine's angle.
     pub const fn new() -> Self {
         Self::with_tracker(SpeedTracker::new())
     }
 }
 
 impl Controller<false> {
-    /// The same for a drive that samples where the ripple of its currents is nothing, with a speed tracker of this natural frequency, in rad/s.
+    /// The same for a drive that samples where its currents have no ripple, with a speed tracker of this natural frequency, in rad/s.
     pub const fn with_tracking(natural_rad_s: f32) -> Self {
         Self::with_tracker(SpeedTracker::with_natural(natural_rad_s))
     }
@@ -232,7 +232,7 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
             demand::Input { demand, window, udc_v, omega, flowing_nm: measured_nm, can_step, period_s };
         let demand_nm = self.demand.step(&shaping, ratings);
         let link = self.link.step(udc_v * link_scale, change_v * link_scale, period_s);
-        // In square wave the voltage follows the link by itself; a limit that did so too made the torque swing by up to 68 % over its ripple.
+        // In square wave the voltage follows the link by itself; a limit that followed it too made the torque swing by up to 68 % over its ripple.
         let limiting = swing.filter(|_| limits.follows != Regulated::Angle);
         let limit = VoltageLimit {
             udc_v: limiting.map_or(link.slow_v, |swing| swing.udc_v * link_scale) / flux,
@@ -327,7 +327,7 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
 }
 
 impl<const RIPPLE: bool> Controller<RIPPLE> {
-    /// Torque that the iron takes, in N·m, of which this share is made up for.
+    /// This share of the torque that the iron takes, in N·m.
     #[inline(always)]
     fn iron_nm(&self, share: f32, tables: &Tables) -> f32 {
         if share == 0.0 {
@@ -337,7 +337,7 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
         }
     }
 
-    /// By how much the magnitude of a demand is to grow for the mean torque to be it, and the torque of the ripple in that, in N·m.
+    /// Growth of a demand's magnitude that makes the mean torque equal to the demand, and the torque of the ripple in it, in N·m.
     #[inline(always)]
     fn trim_nm(&self, demand_nm: f32, limits: &ModeLimits, udc_v: f32, tables: &Tables) -> (f32, f32) {
         let at = (udc_v, self.target.modulation_index);
@@ -348,14 +348,14 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
         (learnt_nm - ripple_nm, ripple_nm)
     }
 
-    /// The current in a steady state without its ripple, in A: where samples have one, the target's. Samples that commands are made of lie at the same
-    /// places of their carriers again and again, and the drop of the ripple there, held until the horizon, turns the flux by a thousandth and more.
+    /// The steady-state current without its ripple, in A: the target's if samples have ripple. The samples used for commands lie at the same places of
+    /// their carriers again and again; the drop of the ripple there, held until the horizon, turns the flux by a thousandth and more.
     #[inline(always)]
     fn mean_a(&self, sample: &RotorSample) -> Dq {
         if RIPPLE { self.target.current } else { sample.current }
     }
 
-    /// Mean torque since the last operating point, in N·m, of which the iron takes a part.
+    /// Mean torque since the last operating point, in N·m, less the part that the iron takes.
     #[inline(always)]
     fn measured_nm(&mut self, iron_nm: f32, period_s: f32) -> f32 {
         let mean_nm = self.sum_nm / self.samples as f32 * self.map_error.scales().torque - iron_nm;
@@ -374,12 +374,12 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
     #[inline(always)]
     fn led(&mut self, point: &OperatingPoint, way: (bool, bool), period_s: f32, tables: &Tables) -> Dq {
         let flux = self.path.step(point.flux, way, self.speed.omega(), period_s);
-        // There already, the point keeps the limit.
+        // Once it is there, the point keeps the limit by itself.
         if flux == point.flux { flux } else { demagnetisation::kept(flux, point.current.q, tables) }
     }
 
-    /// EMF of the `present` flux linkage in Wb, from which a pattern will lead to that of the operating point, in V: as far as the map's
-    /// error is known, and with it what it will leave unexplained there.
+    /// EMF of the `present` flux linkage in Wb, from which a pattern will lead to that of the operating point, in V: corrected as far as the map's
+    /// error is known. Expects, too, the voltage that this error will leave unexplained there.
     fn start_flying(&mut self, present: Dq) -> Dq {
         let omega = self.speed.omega();
         self.disturbance.expect(self.map_error.more_wb(self.target.flux).j() * -omega);
@@ -387,7 +387,7 @@ impl<const RIPPLE: bool> Controller<RIPPLE> {
     }
 }
 
-/// Of two torques of the same sign the smaller one.
+/// The smaller of two torques with the same sign.
 fn nearer_zero(a: f32, b: f32) -> f32 {
     if a.abs() < b.abs() { a } else { b }
 }

@@ -1,6 +1,6 @@
 //! The decoupled current loop, in flux linkage.
 //!
-//! Written in flux, the stator equation `dψ/dt = u − R i − jωψ` is linear however the machine saturates; the maps turn
+//! Written in flux, the stator equation `dψ/dt = u − R i − jωψ` is linear however much the machine saturates; the maps turn
 //! current into flux and back. Proportional part: the flux error predicted for the boundary where the voltage begins
 //! to act. Decoupling: `jωψ`. Integral part: [`Observer`].
 //!
@@ -56,7 +56,7 @@ pub enum Regulated {
     Fundamental,
     /// The angle alone: square wave.
     Angle,
-    /// The flux along a pattern's own path, as far as its next edges can move: optimised patterns.
+    /// The flux along a pattern's own path, as far as the pattern's next edges can move: optimised patterns.
     #[cfg(feature = "optimal")]
     Path,
 }
@@ -78,26 +78,26 @@ impl Regulated {
 pub struct Gains {
     /// Share of the predicted flux error that one carrier half removes, 0 ..= 1, for triangular carriers.
     pub carrier: f32,
-    /// Bandwidth for middle-60° patterns over the highest switching frequency, in rad: as those follow each other faster, more of a flux error goes in a second.
+    /// Bandwidth for middle-60° patterns over the highest switching frequency, in rad: the faster these follow each other, the faster a flux error goes.
     pub pattern_rad: f32,
     /// Damping of the flux error in square wave, as a share of the stator frequency.
     pub square_damping: f32,
     /// Share of an unexplained voltage that one carrier half moves into the integral part.
     pub observer: f32,
-    /// Turn in a carrier half, in rad, up to which the integral part follows six times the stator frequency (what dead time
-    /// leaves); 0: never.
+    /// Turn in a carrier half, in rad, up to which the integral part follows six times the stator frequency (the residue of dead
+    /// time); 0: never.
     pub sixth_turn_rad: f32,
-    /// Likely error of the stator's resistance, as a share of its rating, above 0 and up to 10; the larger, the more of what a voltage leaves unexplained
-    /// along the current counts as that and not as an error of the flux linkage.
+    /// Likely error of the stator's resistance, as a share of its rating, above 0 and up to 10; the larger it is, the more of the unexplained voltage
+    /// along the current counts as resistance error and not as an error of the flux linkage.
     pub resistance_doubt: f32,
-    /// Percent of torque by which a motoring drive follows a percent of swing of its link, so that a line filter in front of it is damped;
+    /// Percent of torque by which a motoring drive follows a percent of its link's swing, to damp a line filter in front of it;
     /// 0: none.
     pub link_damping: f32,
 }
 
 impl Gains {
-    /// Gains that suit carrier halves of 0.2 to 0.8 ms. A pattern's is 350 rad/s at 900 Hz; the same at any frequency left a motor of 8 kHz that comes out of
-    /// weakening with 7 % more current than either mode has, where it now has 3 %.
+    /// Gains that suit carrier halves of 0.2 to 0.8 ms. A pattern's is 350 rad/s at 900 Hz; with the same at every frequency a motor of 8 kHz that comes out of
+    /// weakening had 7 % more current than either mode has, where it now has 3 %.
     pub const DEFAULT: Self = Self {
         carrier: 0.75,
         pattern_rad: 7.0 / 18.0,
@@ -107,9 +107,9 @@ impl Gains {
         resistance_doubt: 0.5,
         link_damping: 0.0,
     };
-    /// The same without what would compensate a dead time's harmonics.
+    /// The same without compensation of a dead time's harmonics.
     pub const WITHOUT_SIXTH: Self = Self { sixth_turn_rad: 0.0, ..Self::DEFAULT };
-    /// Percent for a percent that damp every line filter of 1 to 8 mH, 2 to 8 mF and 10 mΩ or more.
+    /// Percent of torque per percent of swing that damps every line filter of 1 to 8 mH, 2 to 8 mF and 10 mΩ or more.
     pub const LINE_DAMPING: f32 = 3.0;
 
     /// The gains for a dead time that is not compensated, and for a link behind a line filter.
@@ -119,22 +119,22 @@ impl Gains {
     }
 }
 
-/// The flux to be expected at the horizon, whatever is wanted then.
+/// The flux expected at the horizon, whatever is wanted then.
 pub struct Ahead {
-    /// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there; while the gates are off, as it is.
+    /// Flux linkage at the horizon less the pattern's ripple, in the rotor frame there; while the gates are off, the present flux linkage.
     pub flux: Dq,
     /// That frame.
     frame: SinCos,
 }
 
-/// Everything that a step of the loop works on.
+/// The inputs of a step of the loop.
 #[derive(Clone, Copy)]
 pub struct Input<'a> {
-    /// The flux that is predicted for the horizon.
+    /// The flux predicted for the horizon.
     pub ahead: &'a Ahead,
     /// The integral part.
     pub disturbance: &'a Observer,
-    /// The operating point: its flux linkage is the reference, and its current's drop is fed forward.
+    /// The operating point: its flux linkage is the reference, and its current's resistive drop is fed forward.
     pub target: &'a Target,
     /// Electrical angular speed, in rad/s, signed.
     pub omega: f32,
@@ -142,7 +142,7 @@ pub struct Input<'a> {
     pub committed: &'a Committed,
     /// The limits of the mode.
     pub limits: &'a ModeLimits,
-    /// The drop of the target's current in the resistance, in V.
+    /// The resistive drop of the target's current, in V.
     pub drop_v: Dq,
     /// The highest switching frequency, in Hz.
     pub max_switching_hz: f32,
@@ -150,9 +150,9 @@ pub struct Input<'a> {
 
 /// Voltages for the carrier half that begins at the horizon, in V, in the rotor frame that turns with it.
 pub struct Output {
-    /// To be made; limited.
+    /// The voltage to be made; limited.
     pub voltage: Voltage,
-    /// Of the operating point alone; limited likewise.
+    /// The voltage of the operating point alone; limited likewise.
     pub steady: Voltage,
 }
 
@@ -164,7 +164,7 @@ pub struct Voltage {
     pub length_v: f32,
 }
 
-/// The largest voltage of a carrier, in the corners of its hexagon, over that in every direction: 2/√3. Transients may
+/// The largest voltage of a carrier, in the corners of its hexagon, over the one available in every direction: 2/√3. Transients may
 /// use it; beyond the hexagon's edges the modulator's phases saturate, and the prediction sees that they did.
 const TRANSIENT_REACH: f32 = 1.154_7;
 
@@ -183,8 +183,8 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
         let reach = limit * TRANSIENT_REACH;
         let holding = || input.ahead.flux.j() * input.omega + (input.drop_v - disturbance);
         let wanted = mean + input.drop_v - disturbance;
-        // Of more than there is at every angle the modulator takes what there is, in the same direction: going straight there cost the ZS9's motors 55 N·m on a map that is
-        // 20 % off, of 54 that its campaign allows.
+        // If more is asked for than every angle has, the modulator makes what there is, in the same direction: going straight there cost the ZS9's motors
+        // 55 N·m on a map that is 20 % off, of 54 that its campaign allows.
         let vector = if input.limits.index_limit > 1.0 { wanted } else { straight(wanted, holding, reach) };
         (vector, steady - disturbance, reach)
     };
@@ -202,8 +202,8 @@ pub fn step(input: &Input, gains: &Gains) -> Output {
     }
 }
 
-/// The voltage that is `wanted`, or as much of the way to it from the one that is `holding` the flux linkage where it is as `reach_v` allows: the flux
-/// so goes straight to its reference, only more slowly. A shorter voltage of the same direction would let the rotor turn away from it meanwhile, and
+/// The `wanted` voltage, or as much of the way to it as `reach_v` allows, from the voltage that is `holding` the flux linkage where it is. The flux then
+/// goes straight to its reference, only more slowly. With a shorter voltage in the wanted direction the rotor would turn away from it meanwhile, and
 /// a machine without magnets that reverses its torque just above the speed where it weakens takes 1.3 times its steady current on that way.
 #[inline(always)]
 fn straight(wanted: Dq, holding: impl Fn() -> Dq, reach_v: f32) -> Dq {
@@ -221,8 +221,8 @@ fn straight(wanted: Dq, holding: impl Fn() -> Dq, reach_v: f32) -> Dq {
     holding + way * ((root(along * along + length * (beyond - square)) - along) / length)
 }
 
-/// The flux linkage that a pattern can hold where the operating point's voltage is more than it has: that of as much voltage as there is, in
-/// the same direction. Edges that were moved for more, without an end, would leave the flux at another angle.
+/// The flux linkage that a pattern can hold if the operating point's voltage exceeds the available one: the flux linkage of the available voltage, in
+/// the same direction. Edges moved for more, without an end, would leave the flux at another angle.
 #[cfg(feature = "optimal")]
 fn held(input: &Input, steady: Dq) -> Dq {
     let beyond = steady - Voltage::fitted(steady, input.target.voltage_limit_v, false).vector;
@@ -232,9 +232,9 @@ fn held(input: &Input, steady: Dq) -> Dq {
 /// The mean voltage of a carrier half that moves the flux from where it is predicted to where it should be, without the
 /// resistive drop.
 ///
-/// Voltages that hold for a half move the flux along chords, so at the boundaries it stands outside the circle of its
-/// fundamental by x/sin x. The error e goes to (1 − g) e at the half's end, both in the rotor frame that turns by 2x
-/// meanwhile; all is seen from the frame in the middle of the half. With it comes the disturbance in the middle of the half.
+/// Voltages that are constant over a half move the flux along chords, so at the boundaries it lies outside the circle of its
+/// fundamental by x/sin x. The error e becomes (1 − g) e by the half's end, both in the rotor frame that turns by 2x
+/// meanwhile; everything is seen from the frame in the middle of the half. The second result is the disturbance in the middle of the half.
 fn mean_voltage(input: &Input, reference: Dq, gains: &Gains) -> (Dq, Dq) {
     let committed = input.committed;
     let x = 0.5 * input.omega * committed.interval_s;
@@ -248,8 +248,8 @@ fn mean_voltage(input: &Input, reference: Dq, gains: &Gains) -> (Dq, Dq) {
     (chord * (1.0 / committed.interval_s), input.disturbance.voltage(middle))
 }
 
-/// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon, `drop_v` the current's drop in the
-/// resistance until then.
+/// Looks ahead from what is seen now; `half_way` is the rotor's turn in half the time to the horizon, `drop_v` the current's resistive
+/// drop until then.
 #[inline(always)]
 pub fn ahead(
     sample: &RotorSample,
@@ -267,7 +267,7 @@ pub fn ahead(
                 Some(ripple_wb) => volt_seconds - *ripple_wb,
             };
             let unexplained = disturbance.voltage(on_the_way) - drop_v;
-            // By half the way, and by that once more.
+            // By half the way, and then by as much again.
             let back = half_way.back();
             (sample.flux.turned(back) + moved.park(on_the_way) + unexplained * committed.horizon_s)
                 .turned(back)
@@ -277,7 +277,7 @@ pub fn ahead(
 }
 
 impl Voltage {
-    /// The vector, no longer than `limit_v`, its direction kept; where it `fills` that, neither shorter. The zero vector stays.
+    /// The vector, no longer than `limit_v`, its direction kept; if it `fills` the limit, no shorter either. The zero vector stays.
     #[inline(always)]
     fn fitted(vector: Dq, limit_v: f32, fills: bool) -> Self {
         let length_v = vector.length();
@@ -297,7 +297,7 @@ mod tests {
     const OMEGA: f32 = 1_000.0;
     const LIMIT_V: f32 = 500.0;
 
-    /// A carrier's voltage for a reference, of flux linkage that is seen, both in Wb, on a limit in V.
+    /// A carrier's voltage for a reference at a measured flux linkage, both in Wb, with a limit in V.
     fn voltage(flux: Dq, reference: Dq, limit_v: f32) -> Dq {
         voltage_of(&ModeLimits::carrier(0.9), flux, reference, limit_v)
     }
@@ -322,7 +322,7 @@ mod tests {
         step(&input, &Gains::DEFAULT).voltage.vector
     }
 
-    /// A reference that is far away is approached on a straight line, with all the voltage that there is.
+    /// A distant reference is approached on a straight line, with all the voltage available.
     #[test]
     fn the_flux_goes_straight_where_the_voltage_is_limited() {
         let (flux, reach_v) = (Dq { d: 0.1, q: -0.45 }, LIMIT_V * TRANSIENT_REACH);
@@ -348,7 +348,7 @@ mod tests {
         assert!((off(false) - regulated).length() < 1e-3, "{:?}, not {regulated:?}", off(false));
     }
 
-    /// A voltage that cannot go straight, as what holds the flux is beyond the limit, or that is within it, is as it was.
+    /// A voltage stays as it was if it cannot go straight, because the holding voltage is beyond the limit, or if it is within the limit.
     #[test]
     fn a_voltage_keeps_its_direction_where_no_straight_way_is_left() {
         let (flux, reference) = (Dq { d: 0.1, q: -0.6 }, Dq { d: 0.1, q: -0.55 });

@@ -1,17 +1,17 @@
 //! The demagnetisation limit on the way between two operating points.
 //!
-//! Each operating point keeps it by itself. A flux reference that turns on its circle from one to another does not: with as much flux linkage
+//! Each operating point keeps the limit by itself. A flux reference that turns on its circle from one point to another does not: with the same flux linkage
 //! but a larger load angle it stands for a more negative i_d than either.
 
 use crate::frames::Dq;
 use crate::machine::Tables;
 
-/// Steps in which the i_q at the limit is found; the map is a chain of straight lines along it.
+/// Steps to find the i_q at the limit; the map is a chain of straight lines along it.
 const STEPS: u32 = 3;
 
-/// A flux reference, in Wb, no farther down in d than at the demagnetisation limit with the same ψ_q; `near_a` is an i_q to begin at.
+/// A flux reference, in Wb, no lower in d than at the demagnetisation limit with the same ψ_q; `near_a` is an i_q to begin at.
 ///
-/// At the same ψ_q less ψ_d is a more negative i_d, because the map belongs to one current for one flux linkage.
+/// At the same ψ_q, less ψ_d means a more negative i_d, because the map assigns one current to one flux linkage.
 pub fn kept(flux: Dq, near_a: f32, tables: &Tables) -> Dq {
     let Some(least_a) = tables.ratings.least_id_a() else { return flux };
     let map = &tables.flux;

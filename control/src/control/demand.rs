@@ -1,4 +1,4 @@
-//! The torque demand: slew, then envelope and link. What is remembered is what was given, so the next slew begins where the drive is.
+//! The torque demand: slew, then envelope and link. The torque that was given is remembered, so the next slew begins where the drive is.
 
 use crate::frames::limit;
 use crate::machine::Ratings;
@@ -13,18 +13,18 @@ pub struct Demand {
     pub slew_limited: bool,
 }
 
-/// DC-link voltages between which torque is given: motoring torque ends where the link is low, braking torque where it is high,
-/// each along a straight line between two voltages. By default there is no such end.
+/// DC-link voltages between which torque is given: motoring torque ends at a low link voltage, braking torque at a high one,
+/// each along a straight line between two voltages. By default there is no such limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinkWindow {
-    /// Of motoring torque a thousandth is left here and below, in V.
+    /// Link voltage at and below which a thousandth of the motoring torque is left, in V.
     pub motoring_none_v: f32,
-    /// All of it here and above, in V; above `motoring_none_v`.
+    /// Link voltage at and above which all of it is given, in V; above `motoring_none_v`.
     pub motoring_full_v: f32,
-    /// All braking torque here and below, in V; below `braking_none_v`.
+    /// Link voltage at and below which all braking torque is given, in V; below `braking_none_v`.
     pub braking_full_v: f32,
-    /// A thousandth of it here and above, in V.
+    /// Link voltage at and above which a thousandth of it is left, in V.
     pub braking_none_v: f32,
 }
 
@@ -37,7 +37,7 @@ impl LinkWindow {
         braking_none_v: f32::MAX,
     };
 
-    /// Lowest and highest torque at a link voltage, of a largest one in N·m, for an electrical angular speed.
+    /// Lowest and highest torque at a link voltage, for a largest torque in N·m and an electrical angular speed.
     fn bounds_nm(&self, udc_v: f32, largest_nm: f32, omega: f32) -> (f32, f32) {
         let (mut motoring, mut braking) = (largest_nm, largest_nm);
         if udc_v < self.motoring_full_v {
@@ -56,16 +56,16 @@ impl Default for LinkWindow {
     }
 }
 
-/// `x` of `span`; where there is less, or none, so little that a torque just keeps its sign: in square wave the operating points of no torque
+/// `x` as a share of `span`; if there is less, or none, so little that a torque just keeps its sign: in square wave the operating points of no torque
 /// and of hardly any lie far apart.
 fn share(x: f32, span: f32) -> f32 {
     if x > KEPT_SHARE * span { x / span } else { KEPT_SHARE }
 }
 
-/// Share of a torque that the link's window leaves of it.
+/// Share of a torque that the link's window leaves at least.
 const KEPT_SHARE: f32 = 0.001;
 
-/// Torque of what flows while the gates are off without the diodes rectifying, as a share of the largest: none.
+/// Torque while the gates are off and the diodes do not rectify, as a share of the largest: it counts as none.
 const LEAKAGE_SHARE: f32 = 0.01;
 
 #[derive(Clone, Copy, Debug)]
@@ -74,16 +74,16 @@ pub struct Shaper {
     torque_nm: Option<f32>,
 }
 
-/// Everything that shapes a demand.
+/// The inputs that shape a demand.
 pub struct Input<'a> {
     pub demand: &'a Demand,
     pub window: Option<&'a LinkWindow>,
     pub udc_v: f32,
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
-    /// Torque that flows already, in N·m: where a machine that is caught while turning begins.
+    /// Torque that flows already, in N·m: the starting point of a machine that is caught while turning.
     pub flowing_nm: f32,
-    /// `true` if a carrier follows, which can step.
+    /// `true` if a carrier follows the demand: a carrier can step.
     pub can_step: bool,
     pub period_s: f32,
 }
@@ -107,8 +107,8 @@ impl Shaper {
             None if input.flowing_nm.abs() < LEAKAGE_SHARE * ratings.max_torque_nm => 0.0,
             None => input.flowing_nm,
         };
-        // A pattern of few pulses cannot follow a step: its flux hexagon has to be turned against the rotor, and faster it would be
-        // thrown off its centre.
+        // A pattern of few pulses cannot follow a step: its flux hexagon has to be turned against the rotor, and if turned faster
+        // it would be thrown off its centre.
         let shaped = if input.demand.slew_limited || !input.can_step {
             let step = ratings.torque_slew_nm_s * input.period_s;
             limit(wanted, last - step, last + step)
@@ -116,7 +116,7 @@ impl Shaper {
             wanted
         };
         let largest = envelope_nm(input.omega, ratings);
-        // The link is not slewed: its capacitor is full in milliseconds. A pattern follows torque towards zero at any rate.
+        // The limit by the link is not slewed: the link's capacitor fills in milliseconds. A pattern follows torque towards zero at any rate.
         let (lowest, highest) = match input.window {
             Some(window) => window.bounds_nm(input.udc_v, largest, input.omega),
             None => (-largest, largest),
@@ -195,13 +195,13 @@ mod tests {
         };
         let slew_nm = ratings.torque_slew_nm_s * 1e-4;
         for sign in [1.0, -1.0] {
-            // The diodes rectify into a link below the EMF: that goes on from where it is.
+            // The diodes rectify into a link below the EMF: the torque goes on from where it is.
             for share in [LEAKAGE_SHARE, 0.02, 0.05, 0.3] {
                 let flowing_nm = sign * share * ratings.max_torque_nm;
                 assert_eq!(begins_nm(flowing_nm, false), flowing_nm - sign * slew_nm, "{share}");
                 assert_eq!(begins_nm(flowing_nm, true), 0.0, "a carrier can step");
             }
-            // Less is what the sensors' noise makes of no current.
+            // Less is what the sensors' noise shows without current.
             assert_eq!(begins_nm(sign * 0.005 * ratings.max_torque_nm, false), 0.0);
         }
     }

@@ -1,21 +1,21 @@
 //! The integral part of the current loop.
 //!
 //! Between two carrier boundaries the flux should change by the volt-seconds that really acted, less the resistive
-//! drop. What the committed voltages leave unexplained is integrated into a disturbance voltage in the rotor frame: its mean
+//! drop. The part that the committed voltages leave unexplained is integrated into a disturbance voltage in the rotor frame: its mean
 //! (resistance, a wrong map) and, under a carrier, its parts at six times the stator frequency, forward and backward
-//! (dead time: the fifth and seventh harmonic). Because it compares with voltages that acted, not with voltages that were asked
+//! (dead time: the fifth and seventh harmonic). Because it compares with the voltages that acted, not with those that were asked
 //! for, limits and reference steps do not wind it up.
 
 use super::{Boundary, Gains, RotorSample};
 use crate::frames::{AlphaBeta, Angle, Dq, SinCos};
 
-/// The disturbance voltage and what it is learnt from.
+/// The disturbance voltage and the state it is learnt from.
 #[derive(Clone, Copy, Debug)]
 pub struct Observer {
     /// Flux linkage at the last boundary, stationary frame, in Wb.
     last_flux: Option<AlphaBeta>,
     mean: Dq,
-    /// Amplitudes of the cosine and the sine of six times the rotor angle, in V: what turns with it and against it.
+    /// Amplitudes of the cosine and the sine of six times the rotor angle, in V: the parts that turn with it and against it.
     cosine: Dq,
     sine: Dq,
     follows_sixth: bool,
@@ -42,7 +42,7 @@ impl Observer {
         Self { last_flux: None, mean: ZERO, cosine: ZERO, sine: ZERO, follows_sixth: false, latest: ZERO }
     }
 
-    /// A mean disturbance, in V, that is known beforehand.
+    /// Takes a mean disturbance, in V, that is known beforehand.
     pub fn expect(&mut self, mean: Dq) {
         self.mean = mean;
     }
@@ -52,7 +52,7 @@ impl Observer {
         self.mean
     }
 
-    /// All of the disturbance that was expected at the last boundary, in V. Of a rotor that seems to stand its mean and its sixth harmonic
+    /// The whole disturbance that was expected at the last boundary, in V. For a rotor that seems to stand, its mean and its sixth harmonic
     /// are one.
     pub fn latest(&self) -> Dq {
         self.latest
@@ -71,7 +71,7 @@ impl Observer {
         self.mean + self.cosine * sixth.cos + self.sine * sixth.sin
     }
 
-    /// A boundary has passed; the voltage of its half that nothing explains, in V, rotor frame, where it is known what acted.
+    /// Takes a boundary that has passed; the voltage of its half that nothing explains, in V, rotor frame, if it is known what acted.
     #[inline(always)]
     pub(super) fn step(&mut self, input: &Input, gains: &Gains) -> Option<Dq> {
         let Input { boundary, sample, omega, .. } = *input;
@@ -100,7 +100,7 @@ impl Observer {
         self.latest = self.at(sixth);
         let error = (voltage - self.latest) * gain;
         self.mean = self.mean + error;
-        // Either part moves by the error: the one that turns with the angle, and the one against it.
+        // Both parts move by the error: the one that turns with the angle, and the one against it.
         self.cosine = self.cosine + error * (2.0 * sixth.cos);
         self.sine = self.sine + error * (2.0 * sixth.sin);
     }
@@ -119,13 +119,13 @@ mod tests {
     const DISTURBANCE_V: f32 = 20.0;
     const REFERENCE_WB: f32 = 1.0;
 
-    /// Input as it is seen at standstill, without resistance.
+    /// The input as seen at standstill, without resistance.
     fn seen<'a>(boundary: &'a Boundary, sample: &'a RotorSample) -> Input<'a> {
         Input { boundary, sample, omega: 0.0, drop_v: Dq::default(), sixth: false }
     }
 
-    /// The loop at standstill without resistance, on a flux linkage of 0.9 Wb at first: of each half the error in Wb, the voltage that is asked
-    /// for without a limit, the voltage that acts and the estimate before it, in V.
+    /// The loop at standstill without resistance, with a flux linkage of 0.9 Wb at first: for each half the error in Wb, the unlimited voltage
+    /// asked for, the voltage that acts and the estimate before it, in V.
     fn driven(halves: usize, limit_v: f32) -> Vec<[f32; 4]> {
         let (mut observer, mut flux, mut acted_v) = (Observer::new(), 0.9, None);
         let at_rest = Angle::ZERO.sin_cos();
@@ -186,11 +186,11 @@ mod tests {
     fn at_a_limit_it_is_one_with_back_calculation() {
         let halves = driven(400, 10.0);
         is_a_pi(&halves);
-        // 11.5 V against 20 V: the error grows for ever, and the estimate is still that of the disturbance.
+        // 11.5 V against 20 V: the error grows for ever, and the estimate remains that of the disturbance.
         assert!(halves[399][0] > 1.0 && halves[399][3] < DISTURBANCE_V + 0.05, "{:?}", halves[399]);
     }
 
-    /// The estimates at standstill of a voltage that is there, in V, at each of so many boundaries.
+    /// The estimates at standstill for a voltage that is present, in V, at each of so many boundaries.
     fn estimates(voltages: impl Iterator<Item = f32>, gains: &Gains) -> Vec<f32> {
         let (mut observer, mut flux) = (Observer::new(), 0.0);
         let none = Some(AlphaBeta::default());
@@ -209,7 +209,7 @@ mod tests {
         voltages.map(step).collect()
     }
 
-    /// The integral part learns half of a step within 50 halves, a seventh of a turn at 900 Hz and 10 Hz; of what is at random from half to
+    /// The integral part learns half of a step within 50 halves, a seventh of a turn at 900 Hz and 10 Hz; of values that are random from half to
     /// half, like the ripple that a sample does not resolve, an eighth comes through at most.
     #[test]
     fn it_is_quick_enough_for_a_step_and_slow_enough_for_noise() {

@@ -1,9 +1,9 @@
 //! The damping of a link behind a line filter.
 //!
-//! A drive that holds its torque while it motors draws less current when the link rises: to the filter's choke L and capacitor C that is a
-//! negative resistance `−U²/P`, and where their own, R, is below `P L/(C U²)`, the link swings ever more. So the torque follows the link's
-//! swing: by n percent for a percent, which the filter sees as a conductance `(n − 1) P/U²`. A braking drive damps without it. In square
-//! wave the voltage follows the link by itself, and so does the torque once the flux has followed; only slow swings are left to be
+//! A motoring drive that holds its torque draws less current when the link rises. To the filter's choke L and capacitor C that is a
+//! negative resistance `−U²/P`; if their own resistance R is below `P L/(C U²)`, the link swings ever more. So the torque follows the link's
+//! swing, by n percent for a percent, which the filter sees as a conductance `(n − 1) P/U²`. A braking drive damps without it. In square
+//! wave the voltage follows the link by itself, and so does the torque once the flux has followed; only slow swings remain to be
 //! damped.
 
 use super::Regulated;
@@ -12,10 +12,10 @@ use crate::frames::limit;
 /// Bandwidth at which the link's slow value follows, in rad/s. A filter of 8 mH and 8 mF swings at 125 rad/s: with 100 it was not damped.
 const SLOW_RAD_S: f32 = 20.0;
 /// Bandwidth in square wave, as a share of the stator frequency. By trial at 1,900 to 6,000 r/min: with none a filter of 1 mH and 2 mF, whose
-/// 700 rad/s are near the stator frequency there, swung by 8 %; without damping 8 mH and 8 mF tripped.
+/// 700 rad/s are near the stator frequency there, swung by 8 %; without damping, 8 mH and 8 mF tripped.
 const SQUARE_SHARE: f32 = 0.12;
 
-/// The link's swing and what it swings around.
+/// The link's swing and the link with it.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinkSwing {
@@ -26,8 +26,8 @@ pub struct LinkSwing {
 }
 
 impl LinkSwing {
-    /// Torque by which that of a motoring drive, in N·m, is to be greater: `gain` percent of it for a percent, and the whole no
-    /// less than none and no more than the largest.
+    /// Torque by which that of a motoring drive, in N·m, is to be increased: by `gain` percent for a percent of swing, with the total no
+    /// less than zero and no more than the largest.
     pub(super) fn damping_nm(&self, gain: f32, torque_nm: f32, omega: f32, largest_nm: f32) -> f32 {
         if torque_nm * omega <= 0.0 {
             return 0.0;
@@ -47,7 +47,7 @@ pub struct LinkDamper {
 }
 
 impl LinkDamper {
-    /// With a link that has stood at `slow_v`.
+    /// The observer on a link that has stood at `slow_v`.
     pub const fn at(slow_v: f32) -> Self {
         Self { slow_v, share: 0.0 }
     }

@@ -1,25 +1,25 @@
 //! The DC link, as the operating point sees it.
 //!
 //! Operating point and mode follow the link slowly: a rectifier's ripple must neither shake the one nor toggle the other. Slow ripple
-//! passes: so the mode follows the link down at once, and up in many periods of the slowest ripple. What the modulator
-//! divides by is the link as it is. Square wave divides by nothing: there a link that jumps up would throw the flux outward at
-//! once, so until the operating point has followed, no more is made of the link than before.
+//! passes, so the mode follows the link down at once, and up over many periods of the slowest ripple. The modulator
+//! divides by the link as it is. Square wave divides by nothing: a link that jumps up would throw the flux outward at
+//! once, so until the operating point has followed, no more of the link is used than before.
 
 /// Bandwidth at which the link is followed, in rad/s.
 const LINK_RAD_S: f32 = 100.0;
 
-/// The link over its slow value, from which it has jumped and until which: a ripple stays below the one, a notch of the shortest pulse
-/// takes the other.
+/// Ratio of the link to its slow value above which it has jumped, and down to which the jump lasts: a ripple stays below the former, a notch of the shortest
+/// pulse takes the latter.
 const JUMPED: (f32, f32) = (1.04, 1.015);
 
-/// Rate at which the lowest link is left, in rad/s: a tenth in a period of the 33 Hz that a line of 16.7 Hz puts on the link.
+/// Rate of leaving the lowest link, in rad/s: a tenth in a period of the 33 Hz that a line of 16.7 Hz puts on the link.
 const LOWEST_RAD_S: f32 = 3.5;
 
 #[derive(Clone, Copy, Debug)]
 pub struct LinkFilter {
     /// In V; `None` before the first step.
     slow_v: Option<f32>,
-    /// The link over that, above which it has jumped.
+    /// Ratio of the link to that above which it has jumped.
     jump: f32,
     /// The lowest slow value, in V.
     lowest_v: f32,
@@ -29,7 +29,7 @@ pub struct LinkFilter {
 pub struct Link {
     /// Without its ripple.
     pub slow_v: f32,
-    /// The voltage that may be made use of: all there is, unless it has jumped up.
+    /// The usable voltage: the whole link, unless it has jumped up.
     pub usable_v: f32,
 }
 
@@ -38,7 +38,7 @@ impl LinkFilter {
         Self { slow_v: None, jump: JUMPED.0, lowest_v: f32::MAX }
     }
 
-    /// One control period, with the link as it is measured and by how much it will be above that where a voltage acts, in V.
+    /// One control period, with the measured link and its expected rise by the time a voltage acts, in V.
     #[inline(never)]
     pub fn step(&mut self, udc_v: f32, change_v: f32, period_s: f32) -> Link {
         let before = self.slow_v.unwrap_or(udc_v);
@@ -62,7 +62,7 @@ impl LinkFilter {
 mod tests {
     use super::*;
 
-    /// A link that stands at 1,000 V and then is this high, with a volt more to come: the voltage that may be used.
+    /// A link that stands at 1,000 V and then jumps to this voltage, with a volt more to come: the usable voltage.
     fn usable_v(udc_v: f32) -> f32 {
         let mut filter = LinkFilter::new();
         filter.step(1_000.0, 0.0, 0.0);

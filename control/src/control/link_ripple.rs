@@ -1,25 +1,25 @@
 //! The ripple of a link, observed so that a voltage can be made for the link that will be there.
 //!
-//! A command acts one to two carrier halves after its sample: 1.2 ms with three pulses a turn. A rectifier's 300 Hz turn over meanwhile, and the
-//! 33 to 100 Hz of a single-phase line move by up to 70 % of their amplitude. So one sinusoid is followed, `ẋ = jωx`, beside the mean: a
-//! Luenberger observer of which the frequency is adapted by what is left unexplained in quadrature (a frequency-locked loop). A
-//! link that stands still moves nothing, to the bit.
+//! A command acts one to two carrier halves after its sample: 1.2 ms with three pulses a turn. A rectifier's 300 Hz reverse meanwhile, and the
+//! 33 to 100 Hz of a single-phase line move by up to 70 % of their amplitude. So one sinusoid is followed, `ẋ = jωx`, beside the mean, by a
+//! Luenberger observer whose frequency is adapted by the part left unexplained in quadrature (a frequency-locked loop). A
+//! constant link changes nothing, to the bit.
 
 use crate::frames::{Angle, limit};
 
 /// Bandwidth of the mean, in rad/s: 33 Hz are 207.
 const MEAN_RAD_S: f32 = 25.0;
-/// Bandwidth of the sinusoid, in rad/s: of a link that steps, a tenth of the step at 100 Hz is taken for ripple, for some 30 ms.
+/// Bandwidth of the sinusoid, in rad/s: if the link steps, a tenth of the step counts as ripple at 100 Hz for some 30 ms.
 const RIPPLE_RAD_S: f32 = 60.0;
 /// Rate of the frequency's adaption, in 1/s; from 100 Hz it finds 33 and 300 Hz within a tenth of a second.
 const ADAPTION_PER_S: f32 = 60.0;
-/// Frequency at first, and what it is kept within, in rad/s: 20 to 700 Hz.
+/// Initial frequency and the range it is kept within, in rad/s: 20 to 700 Hz.
 const FIRST_RAD_S: f32 = 628.3;
 const SLOWEST_RAD_S: f32 = 125.7;
 const FASTEST_RAD_S: f32 = 4_398.0;
-/// Amplitude squared, as a share of the mean's square, below which the frequency is adapted less and less: of a thousandth.
+/// Amplitude squared, as a share of the mean's square, below which the frequency is adapted less and less: an amplitude of a thousandth.
 const SMALL: f32 = 1e-6;
-/// Distance from what is expected, as a share of the mean, at which all begins anew.
+/// Distance from the expected value, as a share of the mean, at which the observer starts anew.
 const LOST: f32 = 0.25;
 
 /// The observer.
@@ -27,7 +27,7 @@ const LOST: f32 = 0.25;
 pub struct LinkRipple {
     /// In V.
     mean_v: f32,
-    /// The sinusoid and what comes a quarter of a period after it, in V.
+    /// The sinusoid, and the one a quarter of a period after it, in V.
     direct_v: f32,
     quarter_v: f32,
     /// Its angular frequency, in rad/s.
@@ -35,7 +35,7 @@ pub struct LinkRipple {
 }
 
 impl LinkRipple {
-    /// With a link that has stood at `udc_v`.
+    /// The observer on a link that has stood at `udc_v`.
     pub const fn at(udc_v: f32) -> Self {
         Self { mean_v: udc_v, direct_v: 0.0, quarter_v: 0.0, omega: FIRST_RAD_S }
     }
@@ -61,7 +61,7 @@ impl LinkRipple {
         self.quarter_v = quarter_v;
     }
 
-    /// By how much the link will be above what it is `first_s` after the last sample, each of these times after it, in V. The first is short beside the
+    /// Rise of the link above its value `first_s` after the last sample, at each of these times after that sample, in V. The first is short compared with the
     /// ripple's period.
     #[inline(never)]
     pub fn change<const N: usize>(&self, first_s: f32, times_s: [f32; N]) -> [f32; N] {
@@ -84,7 +84,7 @@ mod tests {
         1_500.0 + amplitude_v * Angle::from_turns(turns - (turns as i32) as f32).sin_cos().sin
     }
 
-    /// Of half a second, with a sample every one or two periods, the last tenth: the largest error of the change over 1.25 ms, and the largest such
+    /// Over half a second, with a sample every one or two periods, in the last tenth: the largest error of the change over 1.25 ms, and the largest such
     /// change, in V.
     fn errors_v(amplitude_v: f32, hz: f32) -> (f32, f32) {
         let mut ripple = LinkRipple::at(1_500.0);

@@ -1,49 +1,51 @@
-//! The difference of machine and link from what they are taken for, and its use.
+//! The difference of machine and link from what they are assumed to be, and its use.
 //!
-//! If the machine's flux linkage is ψ + Δψ, with ψ the map's, and its resistance ΔR more than it is taken for, then the voltage jωΔψ + ΔR i is needed that nothing
-//! explains. Three unknowns make it up: ε of the whole flux linkage, m of the magnets' along d, and ΔR with what dead time and devices take along the current:
+//! If the machine's flux linkage is ψ + Δψ, with ψ the map's, and its resistance exceeds the assumed one by ΔR, then a voltage jωΔψ + ΔR i is needed that
+//! nothing explains. That voltage has three unknowns: ε of the whole flux linkage, m of the magnets' along d, and ΔR with what dead time and devices take
+//! along the current:
 //!
 //! Δψ = ε ψ + m, u_d = −ωε ψ_q + ΔR i_d, u_q = ω (ε ψ_d + m) + ΔR i_q
 //!
-//! At one operating point ε and m make any Δψ, and a voltage has two components: three unknowns are not to be told apart there. A Kalman filter begins with what each is
-//! likely to be off by, takes the means of some halves at a time, and remembers what it has seen at other currents and speeds: without a current, which says nothing of
-//! the resistance, all the more of the magnets; of a rotor that stands the resistance alone. What nothing tells of stays; what something tells of is less sure after a
-//! while of it. ΔR is no one resistance: what devices take grows less than the current, `σ (R + V/√(i² + i₀²)) i` for a standard deviation, with σ the doubt of the resistance.
+//! At one operating point ε and m make any Δψ, and a voltage has two components, so the three unknowns cannot be told apart there. A Kalman filter begins with
+//! the likely error of each, takes the means of some halves at a time, and remembers what it has seen at other currents and speeds: without a current, which
+//! says nothing of the resistance, all the more of the magnets; with a rotor that stands, the resistance alone. An unknown that nothing shows stays; one that
+//! something shows is less sure after a while of it. ΔR is no single resistance: the devices' drop grows less than the current, `σ (R + V/√(i² + i₀²)) i` for
+//! a standard deviation, with σ the doubt of the resistance.
 //!
-//! A link that is read too large by ε looks like a machine of which the flux linkage is larger by it, and for the loop both are the same. The torque tells
-//! them apart: as much of ε as a link sensor may be off is taken for that, and all volt-seconds are then those of a link of udc/(1 + ε); the larger ε is beyond, the less of it can
-//! be the sensor's, and the rest is the machine's. The operating point takes that into account: such a machine needs for a torque the current that the map gives for
-//! T/(1 + ΔT/T), and the voltage that it gives on a link of udc/(1 + Δψ/ψ).
+//! A link that is read too large by ε looks like a machine whose flux linkage is larger by ε, and for the loop both are the same. The torque tells them apart.
+//! As much of ε as a link sensor may be off counts as its error, and all volt-seconds are then those of a link of udc/(1 + ε); the larger ε is beyond, the
+//! less of it can be the sensor's, and the rest is the machine's. The operating point takes that into account: for a torque such a machine needs the current
+//! that the map gives for T/(1 + ΔT/T), and the voltage that it gives on a link of udc/(1 + Δψ/ψ).
 
 use super::{Scales, flux_linkage, torque_nm};
 use crate::frames::{Dq, limit_magnitude, sqrt};
 use crate::machine::Tables;
 use crate::time::Clock;
 
-/// Speed from which a voltage tells something of the flux linkage, as a share of the largest.
+/// Speed from which a voltage shows something of the flux linkage, as a share of the largest.
 const FROM: f32 = 0.015;
-/// Halves are averaged for so long, in s: what ripple and sixth harmonic make of them is nothing over some turns.
+/// Time over which halves are averaged, in s: the effect of ripple and sixth harmonic on them is nothing over some turns.
 const BLOCK_S: f32 = 0.025;
-/// Standard deviations, before anything is known, of ε, and of m as a share of the magnets' flux linkage.
+/// Standard deviations of ε, and of m as a share of the magnets' flux linkage, before anything is known.
 const SHARE: f32 = 0.1;
 const MAGNETS: f32 = 0.15;
-/// That of the voltage along a current, beyond the resistance's, over the doubt of the resistance, as a share of the nominal link: half of it is what devices take of a usual
-/// inverter, of a small current the less the smaller it is.
+/// Standard deviation of the voltage along a current, beyond the resistance's, over the doubt of the resistance, as a share of the nominal link: half of it is
+/// what devices of a usual inverter take; for a small current it is the less the smaller the current.
 const DROP: f32 = 4e-3;
 /// Share of the largest current below which that falls with the current, and below which its sign is not known in all phases.
 const SMALL: f32 = 0.05;
-/// Voltage that a mean holds besides, as shares of the nominal link and of the EMF.
+/// Other voltage contained in a mean, as shares of the nominal link and of the EMF.
 const LINK_NOISE: f32 = 3e-3;
 const EMF_NOISE: f32 = 4e-3;
-/// EMF over what the dead time may take from which it tells of the flux linkage.
+/// EMF over the voltage that the dead time may take, from which the EMF shows the flux linkage.
 const TELLING: f32 = 6.0;
-/// Part of what the dead time may take where the signs of all currents are known, in legs of two gates.
+/// Part of the voltage that the dead time may take if the signs of all currents are known, in legs of two gates.
 const LEFT_SHARE: f32 = 0.2;
-/// Part of what the dead time takes that says nothing.
+/// Part of the dead time's voltage that says nothing.
 const UNSAID: f32 = 0.25;
-/// Standard deviations of a voltage that is learnt from: an inverter or a link with a fault has more, and is no error of the machine.
+/// Most standard deviations of a voltage that are learnt from: an inverter or a link with a fault has more, which is no error of the machine.
 const LIKELY: f32 = 1.5;
-/// Time of telling in which what was told of each is forgotten, in s: a winding warms in a minute.
+/// Time of observation in which knowledge of each is forgotten, in s: a winding warms in a minute.
 const KNOWN_S: [f32; 3] = [30.0, 30.0, 10.0];
 /// Error that is the link sensor's: what it may look like.
 const LINK: f32 = 0.03;
@@ -51,9 +53,9 @@ const LINK: f32 = 0.03;
 const LEFT_ALONE: f32 = 0.003;
 /// Part of the magnets' flux linkage that is left alone, as resistance and dead time may look like it.
 const LEFT_TO_MAGNETS: f32 = 0.02;
-/// Share of the largest current by which an operating point is another one.
+/// Share of the largest current by which an operating point counts as another one.
 const MOVED: f32 = 0.01;
-/// Share of the largest current below which i_q makes no torque that tells.
+/// Share of the largest current below which i_q makes too little torque to tell.
 const LITTLE: f32 = 1e-3;
 /// Largest correction.
 const MOST: f32 = 0.25;
@@ -117,10 +119,10 @@ enum Next {
     AlongQ,
 }
 
-/// The use that is made of the errors.
+/// The use of the known errors.
 #[derive(Clone, Copy, Debug)]
 struct Use {
-    /// Torque and flux linkage over those of the map, as far as they are corrected for.
+    /// Torque and flux linkage over those of the map, as far as they are corrected.
     scales: Scales,
     /// ε and m of them, m in Wb.
     whole: f32,
@@ -143,16 +145,16 @@ pub struct Half {
 /// The inverter's dead time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeadTime {
-    /// Voltage that it takes of a phase where nobody knows the sign of its current, in V.
+    /// Voltage that it takes from a phase whose current has an unknown sign, in V.
     pub voltage_v: f32,
-    /// Part of that which is left where the signs of all currents are known and the pulses make up for it, 0 ..= 1.
+    /// Part of that which is left if the signs of all currents are known and the pulses compensate for it, 0 ..= 1.
     pub left_share: f32,
-    /// By how much an edge comes late where nobody makes up for it, in s.
+    /// Delay of an edge that nobody compensates for, in s.
     pub time_s: f32,
 }
 
 impl DeadTime {
-    /// Of legs of two gates: so many ticks in carriers of `carrier_ticks`, on a link of `link_v`.
+    /// The dead time of legs of two gates: so many ticks in carriers of `carrier_ticks`, on a link of `link_v`.
     #[inline]
     pub fn of(ticks: u32, carrier_ticks: u32, link_v: f32, clock: &Clock) -> Self {
         let (ticks, carrier_ticks) = (ticks as f32, carrier_ticks as f32);
@@ -161,11 +163,11 @@ impl DeadTime {
     }
 }
 
-/// Everything that a step works on.
+/// The inputs of a step.
 pub struct Input<'a> {
-    /// Of the operating point, in A.
+    /// Current of the operating point, in A.
     pub current: Dq,
-    /// In Ω, and its likely error as a share of the rating.
+    /// Resistance in Ω, and its likely error as a share of the rating.
     pub resistance: f32,
     pub resistance_doubt: f32,
     pub dead: DeadTime,
@@ -178,12 +180,12 @@ pub struct MapError {
     mean: Unknown,
     covariance: [Unknown; 3],
     sums: Sums,
-    /// Points where the sums began and of the newest use.
+    /// Points of the sums' beginning and of the newest use.
     first: Point,
     newest: Point,
     block: Block,
     next: Next,
-    /// ε that the volt-seconds have already.
+    /// ε that the volt-seconds already contain.
     explained: f32,
     used: Use,
 }
@@ -203,22 +205,22 @@ impl MapError {
         }
     }
 
-    /// By how much the flux linkage is larger than the map's, along itself, as a share.
+    /// Excess of the flux linkage over the map's, along itself, as a share.
     pub fn share(&self) -> f32 {
         self.used.share
     }
 
-    /// Torque and flux linkage over those of the map, as far as they are corrected for.
+    /// Torque and flux linkage over those of the map, as far as they are corrected.
     pub fn scales(&self) -> Scales {
         self.used.scales
     }
 
-    /// The link's voltage over what its sensor reads, as far as it is known: 1/(1 + ε), within 3e-5, of what ε may be the sensor's.
+    /// The link's voltage over its sensor's reading, as far as it is known: 1/(1 + ε), within 3e-5, for the part of ε that may be the sensor's.
     pub fn link_scale(&self) -> f32 {
         self.used.link_scale
     }
 
-    /// Flux linkage, in Wb, that the machine has beyond one by the map, as far as it is corrected for.
+    /// Excess of the machine's flux linkage, in Wb, over one by the map, as far as it is corrected for.
     pub fn more_wb(&self, flux: Dq) -> Dq {
         let Use { whole, magnets_wb, .. } = self.used;
         Dq { d: flux.d * whole + magnets_wb, q: flux.q * whole }
@@ -231,7 +233,7 @@ impl MapError {
         self.used.share = share * SHARE + magnets * MAGNETS;
     }
 
-    /// Volt-seconds are those of a link of so many times what is read.
+    /// Notes that volt-seconds are those of a link of so many times the reading.
     #[inline(always)]
     pub fn scaled(&mut self, link_scale: f32) {
         self.explained = 1.0 - link_scale;
@@ -246,7 +248,7 @@ impl MapError {
         self.sums.time_s += length_s;
     }
 
-    /// A part of what there is to be done, of which each takes one call: use for the present current, and of each block either component. Call where there is time.
+    /// One part of the work, each of which takes one call: the use for the present current, and either component of each block. Call when there is time.
     #[inline(always)]
     pub fn step(&mut self, input: &Input) {
         let moved = (input.current - self.newest.current).squared();
@@ -288,7 +290,7 @@ impl MapError {
         };
     }
 
-    /// Makes means of the sums and begins anew.
+    /// Turns the sums into means and begins anew.
     fn close_block(&mut self) {
         let (sums, first, last) = (self.sums, self.first, self.newest);
         (self.sums, self.first) = (Sums::NONE, last);
@@ -304,12 +306,12 @@ impl MapError {
         };
     }
 
-    /// Voltage that is needed beyond EMF and drop on the link that is read, in V, where on the scaled one so much is.
+    /// Voltage needed beyond EMF and drop on the link as read, in V, for this much on the scaled one.
     fn needed(&self, voltage_v: f32, emf_v: f32, drop_v: f32) -> f32 {
         (voltage_v + self.explained * (emf_v + drop_v)) / (1.0 - self.explained)
     }
 
-    /// Likely voltage along the current, over it.
+    /// Likely voltage along the current, over the current.
     fn drop_ohm(&self, input: &Input) -> f32 {
         let ratings = &input.tables.ratings;
         let small_a = SMALL * ratings.max_current_a;
@@ -317,7 +319,7 @@ impl MapError {
         input.resistance_doubt * (ratings.stator_resistance_ohm + DROP * ratings.dc_link_nominal_v / likely_a)
     }
 
-    /// Voltage that the dead time may take, in V: less the larger the current, as its sign is then known.
+    /// Voltage that the dead time may take, in V: the larger the current the less, as its sign is then known.
     fn dead_v(&self, input: &Input) -> f32 {
         let small_a = SMALL * input.tables.ratings.max_current_a;
         let (small, large) = (small_a * small_a, self.block.current.squared());
@@ -325,7 +327,7 @@ impl MapError {
         input.dead.voltage_v * unsure
     }
 
-    /// A component of the voltage that is needed, in V, with what each unknown makes of it.
+    /// Takes a component of the needed voltage, in V, with the contribution of each unknown to it.
     #[inline(never)]
     fn observe(&mut self, voltage_v: f32, row: Unknown, input: &Input) {
         let ratings = &input.tables.ratings;
@@ -333,7 +335,7 @@ impl MapError {
         let (dead_v, emf_square) = (self.dead_v(input), self.block.emf.squared());
         let noise = link_v * link_v + dead_v * dead_v + (EMF_NOISE * EMF_NOISE) * emf_square;
         let [.., drop] = row;
-        // Where the dead time may take much of the EMF that says nothing of the flux linkage: what is known of it stays.
+        // If the dead time may take much of the EMF, that says nothing of the flux linkage: what is known of it stays.
         let slow = FROM * (ratings.max_speed_rad_s * ratings.pole_pairs);
         let tells = emf_square > (TELLING * TELLING) * (dead_v * dead_v) && self.block.omega.abs() >= slow;
         let told = if tells { row } else { [0.0, 0.0, drop] };
@@ -344,10 +346,10 @@ impl MapError {
         if !missing.is_finite() {
             return;
         }
-        // What the dead time explains says nothing, and what is hardly likely no more than what is.
+        // The part that the dead time explains says nothing, and an unlikely value says no more than a likely one.
         let missing = missing - limit_magnitude(missing, UNSAID * dead_v);
         let missing = limit_magnitude(missing, LIKELY * sqrt(variance)) * per;
-        // Of each component half.
+        // Half for each component.
         let passed_s = 0.5 * self.block.time_s;
         let lost = told.map(|tells| if tells == 0.0 { 0.0 } else { passed_s });
         let [share, magnets, drop] = lost;
@@ -363,7 +365,7 @@ impl MapError {
         }
     }
 
-    /// The use of what is known, with a current.
+    /// Uses what is known at a current.
     fn make_use(&mut self, input: &Input) {
         let Input { current, tables, .. } = *input;
         let ratings = &tables.ratings;
@@ -372,7 +374,7 @@ impl MapError {
         if self.sums.time_s == 0.0 {
             self.first = self.newest;
         }
-        // What a weber of the magnets makes of torque and flux linkage, as shares.
+        // The effect of a weber of the magnets on torque and flux linkage, as shares.
         let per_wb = Scales {
             torque: if current.q.abs() < LITTLE * ratings.max_current_a {
                 1.0 / ratings.magnet_flux_wb
@@ -402,12 +404,12 @@ impl MapError {
     }
 }
 
-/// The number within what may be corrected, or 0 for what is none, as of a machine without magnets.
+/// The number within the limit of correction, or 0 if it is not finite, as for a machine without magnets.
 fn held(share: f32) -> f32 {
     if share.is_finite() { limit_magnitude(share, MOST) } else { 0.0 }
 }
 
-/// The part of an error that is another's, who may be off by so much at most: all of it up to there, none of it from twice as much on.
+/// The part of an error that is another's, which may be off by so much at most: all of it up to there, none of it from twice as much on.
 fn within(share: f32, most: f32) -> f32 {
     let less = 2.0 * most - share.abs();
     if less > 0.0 { limit_magnitude(share, less) } else { 0.0 }

@@ -1,11 +1,11 @@
-//! The control law, which says which voltage is to be made, in pure stages.
+//! The control law, which decides the voltage to be made, in pure stages.
 //!
 //! Torque demand → envelope and slew → current reference (MTPA in two passes, or field weakening) → decoupled
 //! current loop in flux linkage → voltage limit. The loop acts on the flux *predicted* for the boundary at which the
 //! new voltage begins to act, because everything until then is already committed to the modulator.
 //!
-//! Saturation has one order: the demand is limited to what current and voltage allow, the loop's output is limited
-//! to what the mode can give, and the integral part looks only at voltages that really acted, so it cannot wind up.
+//! Saturation has a fixed order: current and voltage limit the demand, the mode limits the loop's output,
+//! and the integral part looks only at voltages that really acted, so it cannot wind up.
 
 #![forbid(unsafe_code)]
 
@@ -61,7 +61,7 @@ pub fn flux_linkage(tables: &Tables, current: Dq) -> Dq {
     Dq { d: psi_d, q: f32::from_bits(psi_q.to_bits() ^ (current.q.to_bits() & SIGN)) }
 }
 
-/// Air-gap torque of a flux linkage and a current, in N·m: `1.5 n_p (psi_d i_q − psi_q i_d)`.
+/// Air-gap torque for a flux linkage and a current, in N·m: `1.5 n_p (psi_d i_q − psi_q i_d)`.
 #[inline]
 pub fn torque_nm(tables: &Tables, flux: Dq, current: Dq) -> f32 {
     1.5 * tables.ratings.pole_pairs * (flux.d * current.q - flux.q * current.d)
@@ -79,7 +79,7 @@ pub struct Measurements {
     pub angle: Angle,
 }
 
-/// Limits that the mode of a half sets for the command of that half.
+/// Limits that a half's mode sets for the command of that half.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ModeLimits {
@@ -87,20 +87,20 @@ pub struct ModeLimits {
     pub follows: Regulated,
     /// Largest fundamental of the mode as a share of six-step.
     pub index_limit: f32,
-    /// Largest fundamental that the operating point may use, as a share of six-step; what is left of [`Self::index_limit`] is for regulation.
+    /// Largest fundamental that the operating point may use, as a share of six-step; the rest up to [`Self::index_limit`] is for regulation.
     pub steady_limit: f32,
-    /// The fundamental is to be that large, whatever the torque needs.
+    /// The fundamental must be that large, whatever the torque needs.
     pub filled: bool,
-    /// Flux ripple of the pattern, as a share of the fundamental flux; zero where the samples do not tell what it does to the torque,
+    /// Flux ripple of the pattern, as a share of the fundamental flux; zero if the samples do not show its effect on the torque,
     /// which then is not trimmed.
     pub ripple_share: f32,
-    /// Mean squares of the pattern's flux ripple along the flux linkage and across it, over the square of the link's voltage, in s²; `None` where it does nothing
-    /// to the torque.
+    /// Mean squares of the pattern's flux ripple along the flux linkage and across it, over the square of the link's voltage, in s²; `None` if it does
+    /// nothing to the torque.
     pub ripple_s2: Option<[f32; 2]>,
-    /// The pattern's flux is where it will stay; not while a switch between two patterns is still going on.
+    /// The pattern's flux is where it will stay; not during a switch between two patterns.
     pub settled: bool,
-    /// The half is a pattern's first one behind another pattern: it begins where their paths meet, away from its own angle, and what its flux linkage differs by there is
-    /// no error.
+    /// The half is a pattern's first one after another pattern: it begins where their paths meet, away from its own angle, and the difference of its flux
+    /// linkage there is no error.
     pub joins: bool,
 }
 
@@ -120,7 +120,7 @@ impl ModeLimits {
     }
 }
 
-/// The voltages that the modulator has already committed itself to, seen from the sample.
+/// The voltages already committed to the modulator, seen from the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Committed {
@@ -128,9 +128,9 @@ pub struct Committed {
     pub horizon_s: f32,
     /// Volt-seconds until then, in V·s; `None` while the gates are off.
     pub volt_seconds: Option<AlphaBeta>,
-    /// Ripple flux of the pattern at the horizon, in Wb; `None` where there is none.
+    /// Ripple flux of the pattern at the horizon, in Wb; `None` if there is none.
     pub ripple_wb: Option<AlphaBeta>,
-    /// Expected time for which the next voltage acts, in s, greater than zero: that of the carrier halves that are made by it.
+    /// Expected time for which the next voltage acts, in s, greater than zero: that of the carrier halves made with it.
     pub interval_s: f32,
 }
 
@@ -138,7 +138,7 @@ pub struct Committed {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Boundary {
-    /// Volt-seconds of that half, in V·s; `None` when the gates were off in it, or the half before it was not seen.
+    /// Volt-seconds of that half, in V·s; `None` if the gates were off in it or the half before it was not seen.
     pub volt_seconds: Option<AlphaBeta>,
     /// Length of that half, in s, greater than zero.
     pub length_s: f32,
@@ -162,10 +162,10 @@ pub struct VoltageVector {
     /// Fundamental, peak phase, in V.
     pub voltage_v: f32,
     /// The same as a vector at the sample, as if it acted there already, in V; it turns with the rotor. While the gates are off and a
-    /// pattern follows, the EMF: what the pattern starts from.
+    /// pattern follows, the EMF, from which the pattern starts.
     pub vector: AlphaBeta,
-    /// Likewise what a locked carrier keeps its angle to: the steady fundamental where pulses can regulate
-    /// without it or there are none yet, the vector itself where the angle is what regulates.
+    /// Likewise the vector that a locked carrier keeps its angle to: the steady fundamental if pulses can regulate
+    /// without it or there are none yet, the vector itself if the angle is what regulates.
     pub carrier: AlphaBeta,
     /// Fundamental of the operating point without regulation, peak phase, in V.
     pub steady_v: f32,
@@ -179,7 +179,7 @@ pub struct RotorSample {
     pub frame: SinCos,
     /// Current, rotor frame, in A.
     pub current: Dq,
-    /// Flux linkage that belongs to the current by the map, in Wb.
+    /// Flux linkage for that current by the map, in Wb.
     pub flux: Dq,
 }
 

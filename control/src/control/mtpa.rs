@@ -6,8 +6,8 @@ use crate::machine::Tables;
 /// The current of least magnitude for a torque in N·m (either sign, |T| within the machine's largest), in A; its i_d is no lower than the
 /// demagnetisation limit.
 ///
-/// The first pass reads ψ_f and L_q − L_d at the start point that the tables give for this torque, the second one at the
-/// result of the first. What the start points and trims hold is decided offline.
+/// The first pass reads ψ_f and L_q − L_d at the start point that the tables give for this torque; the second pass reads them at the
+/// result of the first. The contents of start points and trims are decided offline.
 ///
 /// ```
 /// use tractive_control::control::{flux_linkage, mtpa, torque_nm};
@@ -35,7 +35,7 @@ pub fn mtpa(torque_nm: f32, tables: &Tables) -> Dq {
 }
 
 /// `PASSES` of the paper's passes for a torque of at least zero, in N·m, the first with the parameters at `start`, in A. The
-/// paper does not say where it starts; those of zero current are the plain reading.
+/// paper does not say where it starts; the plain reading is to start with the parameters of zero current.
 pub fn mtpa_passes<const PASSES: usize>(torque_nm: f32, start: Dq, tables: &Tables) -> Dq {
     let mut current = start;
     for _ in 0..PASSES {

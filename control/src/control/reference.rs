@@ -1,8 +1,8 @@
 //! The operating point: MTPA, field weakening, and the switch between them.
 //!
-//! At a speed the voltage limit is a limit of flux linkage. The current for a torque on the circle of that flux
-//! stands in a table; whichever of it and the MTPA point lies further left in i_d keeps both limits. In square
-//! wave the voltage is what it is, so the point lies on the circle on either side of MTPA.
+//! At a given speed the voltage limit is a limit of flux linkage. A table holds the current for a torque on the circle of that
+//! flux; of this current and the MTPA point, the one further left in i_d keeps both limits. In square
+//! wave the voltage is fixed, so the point lies on the circle on either side of MTPA.
 
 use super::{flux_linkage, mtpa};
 use crate::frames::{Dq, root, six_step_v, sqrt};
@@ -32,7 +32,7 @@ pub struct VoltageLimit {
     pub udc_v: f32,
     /// Largest fundamental, as a share of six-step.
     pub modulation_index: f32,
-    /// `true` if the fundamental always is that large (square wave).
+    /// `true` if the fundamental is always that large (square wave).
     pub filled: bool,
 }
 
@@ -43,21 +43,21 @@ pub struct VoltageLimit {
 pub struct OperatingPoint {
     /// Current, in A.
     pub current: Dq,
-    /// Flux linkage that belongs to it by the map, in Wb.
+    /// Flux linkage for that current by the map, in Wb.
     pub flux: Dq,
     /// Torque that it gives, in N·m.
     pub torque_nm: f32,
     /// Its source.
     pub region: Region,
-    /// Voltage of the MTPA point at this speed, as a share of six-step (above 1 where weakening is needed).
+    /// Voltage of the MTPA point at this speed, as a share of six-step (above 1 if weakening is needed).
     pub modulation_index: f32,
 }
 
-/// Below this share of the voltage limit the MTPA point needs no weakening, by the flux map that the target has; above, the
+/// Share of the voltage limit below which the MTPA point needs no weakening, by the flux map that the target has; above it, the
 /// circles decide.
 const SURELY_WITHIN: f32 = 0.98;
 /// A point on the circle of the voltage limit counts as left of the MTPA point until it is right of it by this share of the
-/// largest current: as much as the MTPA point may be off. Near the optimum the magnitude hardly changes.
+/// largest current: the possible error of the MTPA point. Near the optimum the magnitude hardly changes.
 const MTPA_OFF: f32 = 0.002;
 
 /// The current for a torque in N·m at an electrical angular speed in rad/s. The voltage is that of equation (3) on the flux map.
@@ -114,7 +114,7 @@ pub(super) fn point(
     let right = current.d - best.d >= MTPA_OFF * tables.ratings.max_current_a;
     let is_least = match region {
         Region::Weakening => right || inside,
-        // Where the voltage is a little more than it needs, the circle of its flux linkage may meet the largest current at less torque.
+        // If the voltage slightly exceeds the need, the circle of its flux linkage may meet the largest current at less torque.
         _ => steady_v.squared() <= voltage_v * voltage_v,
     };
     if is_least && !limit.filled {
@@ -140,7 +140,7 @@ struct Weakened {
 }
 
 /// The point on the circle of flux linkage that the voltage allows, for either sign of torque. From (3) squared,
-/// `u² = (ωψ)² + 2 R ω T/(1.5 n_p) + R² i²`, all of it taken times 1/ω². Inlined, so that the compiler knows the tables.
+/// `u² = (ωψ)² + 2 R ω T/(1.5 n_p) + R² i²`, all multiplied by 1/ω². Inlined, so that the compiler knows the tables.
 #[inline(always)]
 fn weakened(torque_nm: f32, mtpa_squared: f32, at: &Electrical, tables: &Tables) -> Weakened {
     let Electrical { omega, voltage_v, resistance } = *at;
@@ -156,8 +156,8 @@ fn weakened(torque_nm: f32, mtpa_squared: f32, at: &Electrical, tables: &Tables)
     };
     let resistance_squared = resistance * resistance;
     let largest_squared = ratings.max_current_a * ratings.max_current_a;
-    // Without torque and with the largest current. From there the most torque along its slope: its own drop leaves less flux, or
-    // more when braking. As the slope is the least one, the flux comes out too small rather than too large.
+    // First without torque and with the largest current; from there the most torque along its slope: its own drop leaves less flux, or
+    // more when braking. Since the slope is the least one, the flux comes out too small rather than too large.
     let square = voltage_v * voltage_v - resistance_squared * largest_squared;
     let [_, most, slope, above, rise] = torque.at(place(square));
     let drop = torque_nm.signum() * omega * (2.0 * resistance / factor);
@@ -177,7 +177,7 @@ fn weakened(torque_nm: f32, mtpa_squared: f32, at: &Electrical, tables: &Tables)
     let [d, effective] = currents.at(at, (1.0 - left) / ((1.0 + share_knee) - left));
     let torque_nm = if torque_nm < 0.0 { -given } else { given };
     Weakened {
-        // Beyond the narrowest circle the table would go on.
+        // Beyond the narrowest circle the table would continue.
         current: Dq { d: ratings.kept_id_a(d), q: torque_nm / (factor * effective) },
         torque_nm,
         region: if limited { Region::Limit } else { Region::Weakening },

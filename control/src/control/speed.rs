@@ -4,10 +4,10 @@ use crate::frames::{Angle, sqrt};
 
 /// Natural frequency of the loop unless another is wanted, in rad/s; critically damped.
 const NATURAL_RAD_S: f32 = 500.0;
-/// Lag behind the machine's largest acceleration, in rad, that a natural frequency is wanted for; the largest, over the sampling rate.
+/// Wanted lag at the machine's largest acceleration, in rad; and the largest natural frequency, over the sampling rate.
 const LAG_RAD: f32 = 0.0125;
 const SAMPLED: f32 = 0.25;
-/// Control periods until the estimate is used.
+/// Control periods before the estimate is used.
 const SETTLING_STEPS: u32 = 200;
 
 /// The speed and the angle that is followed, and how well.
@@ -15,9 +15,9 @@ const SETTLING_STEPS: u32 = 200;
 pub struct SpeedTracker {
     angle: Angle,
     omega: f32,
-    /// By how much the newest angle was ahead of the one that was expected, in rad.
+    /// Lead of the newest angle over the expected one, in rad.
     ahead_rad: f32,
-    /// Angles that were followed, until it has settled.
+    /// Number of followed angles, counted until the loop has settled.
     steps: u32,
     natural_rad_s: f32,
     /// `true` if an angle was not followed.
@@ -30,12 +30,12 @@ impl SpeedTracker {
         Self::with_natural(NATURAL_RAD_S)
     }
 
-    /// With another natural frequency, in rad/s; well below the sampling rate.
+    /// A tracker with another natural frequency, in rad/s; well below the sampling rate.
     pub const fn with_natural(natural_rad_s: f32) -> Self {
         Self { angle: Angle::ZERO, omega: 0.0, ahead_rad: 0.0, steps: 0, natural_rad_s, lost: false }
     }
 
-    /// Follows a rotor of this largest acceleration, in rad/s²: no slower than before.
+    /// Adapts the loop to a rotor with this largest acceleration, in rad/s²: no slower than before.
     pub fn quicken(&mut self, acceleration_rad_s2: f32, period_s: f32) {
         let (wanted, most) = (sqrt(acceleration_rad_s2 * (1.0 / LAG_RAD)), SAMPLED / period_s);
         let natural = if wanted < most { wanted } else { most };
@@ -44,7 +44,7 @@ impl SpeedTracker {
         }
     }
 
-    /// Largest acceleration, in rad/s², that the loop can follow with this lag, in rad, where it samples so often.
+    /// Largest acceleration, in rad/s², that the loop can follow with this lag, in rad, at this sampling period.
     pub const fn most_acceleration_rad_s2(lag_rad: f32, period_s: f32) -> f32 {
         let most = SAMPLED / period_s;
         lag_rad * most * most
@@ -55,12 +55,12 @@ impl SpeedTracker {
         self.angle + Angle::within_half_turn(self.omega * period_s)
     }
 
-    /// The angle measured now; returns the electrical angular speed in rad/s.
+    /// Takes the angle measured now; returns the electrical angular speed in rad/s.
     pub fn step(&mut self, measured: Angle, period_s: f32) -> f32 {
         self.follow(measured, measured - self.predicted(period_s), period_s)
     }
 
-    /// The same where it is known already by how much the angle is off the predicted one.
+    /// The same if the angle's difference from the predicted one is already known.
     #[inline(always)]
     pub fn follow(&mut self, measured: Angle, innovation: Angle, period_s: f32) -> f32 {
         if self.steps < SETTLING_STEPS {
@@ -106,12 +106,12 @@ impl SpeedTracker {
         self.omega
     }
 
-    /// Electrical angular speed of a rotor that speeds up or slows down steadily, in rad/s: its [estimate](Self::omega) lags.
+    /// Electrical angular speed of a rotor that accelerates or brakes steadily, in rad/s: its [estimate](Self::omega) lags.
     pub fn leading(&self) -> f32 {
         self.omega + 2.0 * self.natural_rad_s * self.ahead_rad
     }
 
-    /// The angle that is followed, at the newest sample.
+    /// The followed angle at the newest sample.
     pub fn angle(&self) -> Angle {
         self.angle
     }
@@ -121,7 +121,7 @@ impl SpeedTracker {
         self.natural_rad_s
     }
 
-    /// `true` once so many angles have been followed that the speed can be used.
+    /// `true` once enough angles have been followed for the speed to be used.
     pub fn is_settled(&self) -> bool {
         self.steps >= SETTLING_STEPS
     }

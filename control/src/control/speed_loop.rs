@@ -3,7 +3,7 @@
 use crate::frames::limit;
 use crate::machine::Ratings;
 
-/// The quantities that the gains follow from.
+/// The quantities that determine the gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpeedDesign {
@@ -12,16 +12,16 @@ pub struct SpeedDesign {
     /// Natural frequency ω₀ of the loop, in rad/s, critically damped. A load step ΔT makes an error of
     /// `ΔT/J t e^(−ω₀ t)`: largest after 1/ω₀, gone after a few of these.
     pub natural_rad_s: f32,
-    /// From one step to the next, in s, above 0.
+    /// Time from one step to the next, in s, above 0.
     pub period_s: f32,
 }
 
 impl SpeedDesign {
-    /// Largest torque that a speed error of 1 rad/s may ask for, as a multiple of the largest: more is noise of the speed.
+    /// Largest torque that a speed error of 1 rad/s may ask for, as a multiple of the largest: beyond it the torque would be noise of the speed.
     pub const STIFFEST: f32 = 10.0;
 
-    /// A loop for the rotor of a machine, with a natural frequency in rad/s, above 0, and the control period in s. The inertia is that of `J = n_p T/α`, of largest torque and
-    /// electrical acceleration; a rotor that would need more than [`Self::STIFFEST`], `2 J ω₀ > 10 T`, has a lower frequency.
+    /// A loop for a machine's rotor, with a natural frequency in rad/s, above 0, and the control period in s. The inertia is `J = n_p T/α`, of the largest
+    /// torque and electrical acceleration; a rotor that would need more than [`Self::STIFFEST`], `2 J ω₀ > 10 T`, gets a lower frequency.
     pub const fn of(ratings: &Ratings, natural_rad_s: f32, period_s: f32) -> Self {
         let inertia_kg_m2 = ratings.max_torque_nm * ratings.pole_pairs / ratings.max_acceleration_rad_s2;
         let most_rad_s = 0.5 * Self::STIFFEST * ratings.max_torque_nm / inertia_kg_m2;
@@ -30,13 +30,13 @@ impl SpeedDesign {
     }
 }
 
-/// Everything that a step works on; speeds mechanical, in rad/s.
+/// The inputs of a step; speeds are mechanical, in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpeedInput {
-    /// Speed wanted.
+    /// Wanted speed.
     pub wanted_rad_s: f32,
-    /// Speed measured.
+    /// Measured speed.
     pub measured_rad_s: f32,
     /// Largest torque either way, in N·m, from 0.
     pub largest_nm: f32,
@@ -49,12 +49,12 @@ pub struct SpeedLoop {
 }
 
 impl SpeedLoop {
-    /// Without torque.
+    /// The state without torque.
     pub const fn new() -> Self {
         Self { integral_nm: 0.0 }
     }
 
-    /// Goes on from a torque, in N·m.
+    /// The state that continues from a torque, in N·m.
     pub const fn at(torque_nm: f32) -> Self {
         Self { integral_nm: torque_nm }
     }
@@ -108,7 +108,7 @@ mod tests {
         for _ in 0..100_000 {
             assert_eq!(state.step(&far, &DESIGN), 120.0);
         }
-        // Past the goal the torque turns at once.
+        // Past the goal the torque reverses at once.
         let past = SpeedInput { measured_rad_s: 101.0, ..far };
         assert!(state.step(&past, &DESIGN) < 0.0);
         assert_eq!(SpeedLoop::at(7.0).step(&SpeedInput { measured_rad_s: 100.0, ..far }, &DESIGN), 7.0);

@@ -1,32 +1,32 @@
 //! The trim of mean torque.
 //!
 //! The current loop holds the fundamental of the flux. In a saturated machine the ripple around it changes the mean torque by up
-//! to some percent, most in the patterns of few pulses: in proportion to the square of the ripple, as the curvature of torque over
-//! flux does it. What follows from the map is known beforehand ([`ripple_nm`]). Beyond that the torque of the measured currents tells: what is
+//! to some percent, most in the patterns of few pulses: in proportion to the square of the ripple, by the curvature of torque over
+//! flux. The part that follows from the map is known beforehand ([`ripple_nm`]). The rest is found from the torque of the measured currents: what is
 //! missing on average is slowly added to the demand, and what was learned under one pattern holds for the next one.
 //!
-//! Under optimised patterns the average is that of whole sixths of a turn, in which torque repeats. A trim that followed the ripple of torque would shake the
-//! reference in step with the pulses, whose edges reach the flux linkage in one direction at a time: half a percent too much of it was made.
+//! Under optimised patterns the average is taken over whole sixths of a turn, in which torque repeats. A trim that followed the torque ripple would shake the
+//! reference in step with the pulses, whose edges reach the flux linkage in one direction at a time: half a percent too much torque was made.
 
 use crate::frames::{limit, limit_magnitude};
 use crate::machine::Tables;
 
 /// Bandwidth, in rad/s: the torque ripple at six times the stator frequency must not come through.
 const BANDWIDTH_RAD_S: f32 = 60.0;
-/// Largest trim, as a share of the demand, beyond as much as is foreseen, either way: that may have to be taken back whole, as where a sensor's filter smooths the ripple.
+/// Largest trim either way, as a share of the demand, beyond the foreseen one: that may have to be taken back whole, if a sensor's filter smooths the ripple.
 const MOST: f32 = 0.06;
 /// Share of the largest torque below which the trim no longer shrinks with the demand.
 const CONSTANT_BELOW: f32 = 0.4;
 /// Rate of change of the demand that counts as a change, as a share of the largest torque, in 1/s.
 const STEADY_RATE: f32 = 1.0;
-/// Time after a change of the demand in which the current loop is still at work, in s.
+/// Time after a change of the demand during which the current loop is still at work, in s.
 const HOLD_S: f32 = 0.01;
 
-/// Most of a demand that a ripple may add or take: at a rotor that has just stopped a locked pattern's would have no end. Of sixty random machines 0.14 is the most.
+/// Most of a demand that a ripple may add or take: for a rotor just stopped, a locked pattern's would have no end. Of sixty random machines 0.14 is the most.
 const MOST_RIPPLE: f32 = 0.17;
-/// Part of six-step by which the MTPA point's voltage exceeds it where no curvature is left: the iron of a machine that weakens saturates less. By the map of the
-/// 180 kW machine, from a quarter of its torque on, 0.83 to 0.56 of the MTPA point's is left at 0.06 to 0.18 beyond, and a tenth at 0.41; with the
-/// ripple that is taken to grow along, this has 0.90, 0.56 and nothing there.
+/// Excess of the MTPA point's voltage over six-step, as a part of it, at which no curvature is left: the iron of a machine that weakens saturates less. By the
+/// map of the 180 kW machine, from a quarter of its torque on, 0.83 to 0.56 of the MTPA point's is left at 0.06 to 0.18 beyond, and a tenth at 0.41; with the
+/// ripple that is assumed to grow along, this has 0.90, 0.56 and nothing there.
 const CURVED_UNTIL: f32 = 0.3;
 
 /// The torque that a flux ripple adds to the magnitude of a demand, in N·m, on a link of `udc_v`, where the MTPA point asks for `modulation_index`; `ripple_s2` as in
@@ -60,7 +60,7 @@ pub struct TorqueTrim {
 #[derive(Clone, Copy, Debug)]
 struct Sixth {
     passed_s: f32,
-    /// Torque that has been missing, summed up, in N·m·s.
+    /// Missing torque, integrated, in N·m·s.
     missing_nms: f32,
 }
 
@@ -68,7 +68,7 @@ struct Sixth {
 impl Sixth {
     const NONE: Self = Self { passed_s: 0.0, missing_nms: 0.0 };
 
-    /// A period in which so much torque has been missing, in N·m; the mean and the time of the sixth that it ends.
+    /// Takes a period in which so much torque has been missing, in N·m; returns the mean and the time of the sixth that it ends.
     fn step(&mut self, missing_nm: f32, period_s: f32, omega: f32) -> Option<(f32, f32)> {
         let Self { passed_s, missing_nms } = *self;
         let (passed_s, missing_nms) = (passed_s + period_s, missing_nms + missing_nm * period_s);
@@ -78,9 +78,9 @@ impl Sixth {
     }
 }
 
-/// Everything that a step of the trim works on.
+/// The inputs of a step of the trim.
 pub struct Input {
-    /// Torque demanded, in N·m.
+    /// Demanded torque, in N·m.
     pub demand_nm: f32,
     /// Torque of the measured currents, in N·m.
     pub measured_nm: f32,
@@ -88,13 +88,13 @@ pub struct Input {
     pub foreseen_nm: f32,
     /// `true` if the demand with its trim is beyond what current and voltage allow.
     pub limited: bool,
-    /// `true` if the demand itself is.
+    /// `true` if the demand itself is beyond that.
     pub short: bool,
-    /// Flux ripple over fundamental flux; zero where the samples do not tell what it does.
+    /// Flux ripple over fundamental flux; zero if the samples do not show its effect.
     pub ripple_share: f32,
     pub largest_nm: f32,
     pub period_s: f32,
-    /// Electrical angular speed, in rad/s, where whole sixths of a turn are averaged.
+    /// Electrical angular speed, in rad/s, if whole sixths of a turn are averaged.
     #[cfg(feature = "optimal")]
     pub by_sixths: Option<f32>,
 }
@@ -110,7 +110,7 @@ impl TorqueTrim {
         }
     }
 
-    /// By how much the magnitude of the demand is to grow, in N·m, beyond the torque of the ripple that is foreseen.
+    /// Growth of the demand's magnitude, in N·m, beyond the foreseen torque of the ripple.
     pub fn trim_nm(&self, demand_nm: f32, foreseen_nm: f32, ripple_share: f32, largest_nm: f32) -> f32 {
         let most = MOST * demand_nm.abs() + foreseen_nm.abs();
         limit_magnitude(self.curvature * ripple_share * ripple_share * scale(demand_nm, largest_nm), most)
@@ -136,7 +136,7 @@ impl TorqueTrim {
         }
         let missing = input.demand_nm - input.measured_nm;
         let missing = if input.demand_nm < 0.0 { -missing } else { missing };
-        // More trim would be of no use. Where the demand is beyond the limit less of it neither: the crests of the ripple alone would
+        // More trim would be of no use. Nor would less, if the demand is beyond the limit: the crests of the ripple alone would
         // take the trim down until the limit seemed kept.
         if input.limited && (input.short || missing > 0.0) {
             return;
@@ -161,7 +161,7 @@ impl TorqueTrim {
     }
 }
 
-/// Torque to which the trim is in proportion, in N·m, greater than zero.
+/// Torque that the trim is proportional to, in N·m, greater than zero.
 fn scale(demand_nm: f32, largest_nm: f32) -> f32 {
     let (magnitude, least) = (demand_nm.abs(), CONSTANT_BELOW * largest_nm);
     if magnitude > least { magnitude } else { least }
@@ -188,7 +188,7 @@ mod tests {
         by_sixths: None,
     };
 
-    /// Trim after 10 ms of holding and 100 ms of an error of torque that nothing changes.
+    /// Trim after 10 ms of holding and 100 ms of a constant error of torque.
     fn learned_nm(measured_nm: f32, limited: bool, short: bool) -> f32 {
         learned_beyond_nm(0.0, measured_nm, limited, short)
     }
@@ -218,7 +218,7 @@ mod tests {
         assert_eq!(learned_nm(910.0, true, true), 0.0, "crests of the ripple");
     }
 
-    /// A carrier that the samples do not tell the torque of.
+    /// A carrier whose torque the samples do not show.
     #[test]
     fn no_ripple_teaches_nothing_and_has_no_trim() {
         let mut trim = TorqueTrim::new();
@@ -234,7 +234,7 @@ mod tests {
         assert_eq!(learn(0.0), learnt);
     }
 
-    /// A demand that changes by more than the largest torque in a second is one after which the loop is still at work.
+    /// After a demand that changes by more than the largest torque in a second, the loop is still at work.
     #[test]
     fn a_steep_ramp_teaches_nothing() {
         for (largest_nm, slope_nm_s, learns) in
@@ -254,7 +254,7 @@ mod tests {
         }
     }
 
-    /// A demand that changes by just the largest torque in a second is not yet steep.
+    /// A demand that changes by exactly the largest torque in a second is not yet steep.
     #[test]
     fn the_border_of_a_steep_ramp_is_not_steep() {
         let mut trim = TorqueTrim::new();

@@ -1,4 +1,4 @@
-//! The warmth of the machine, as whoever measures its temperatures tells it to the control law.
+//! The warmth of the machine, told to the control law by whoever measures its temperatures.
 
 use crate::frames::limit;
 
@@ -11,10 +11,10 @@ const PER_RATIO: f32 = 16_384.0;
 pub struct Warmth(u16);
 
 impl Warmth {
-    /// As rated: nothing is known of temperatures.
+    /// The rated value: nothing is known of temperatures.
     pub const NONE: Self = Self(0);
 
-    /// Of the stator resistance over its rating, 0.01 to 2.99. What is not a number counts as rated.
+    /// The warmth for a stator resistance over its rating, 0.01 to 2.99. NaN counts as rated.
     pub fn new(resistance_ratio: f32) -> Self {
         let steps = (limit(resistance_ratio, 0.01, 2.99) - 1.0) * PER_RATIO;
         Self((steps + 0.5_f32.copysign(steps)) as i16 as u16)
@@ -26,7 +26,7 @@ impl Warmth {
         word
     }
 
-    /// Of a word.
+    /// The warmth of a word.
     pub const fn from_word(word: u16) -> Self {
         Self(word)
     }
@@ -48,7 +48,7 @@ pub struct Scales {
 }
 
 impl Scales {
-    /// As by the map.
+    /// The map's own torque and flux linkage.
     pub const NONE: Self = Self { torque: 1.0, flux: 1.0 };
 }
 

@@ -1,10 +1,10 @@
 //! The Z-source network's control: how long the bridge shorts the link.
 //!
 //! The link's voltage outside shoot-through is `U_in = v1 + v2 − U_dc`; it is not continuous, so the capacitors' voltage is
-//! what is controlled, to `v_C* = (U_in* + U_dc)/2`. A PI gives the inductors' current, beside the motors' power over
-//! U_dc, which is what that current is in steady state; an inner loop gives the shoot-through duty.
+//! controlled instead, to `v_C* = (U_in* + U_dc)/2`. A PI gives the inductors' current, in addition to the motors' power over
+//! U_dc, which is that current in steady state; an inner loop gives the shoot-through duty.
 //!
-//! The loop must always be closed: motors that are fed with constant power make the network unstable with a fixed duty above
+//! The loop must always be closed: motors fed with constant power make the network unstable at a fixed duty above
 //! about `r C U_in²/(2 L)`. Its bandwidth is bounded by the right-half-plane zero at `U_dc/(2 i_L L)` rad/s: energy must
 //! go into the inductors, away from the link, before there can be more of it in the capacitors.
 
@@ -12,7 +12,7 @@ use crate::frames::limit;
 use crate::machine::{Ratings, ZSourceNetwork};
 use core::f32::consts::TAU;
 
-/// The network, the bandwidths and the limits: all that the gains follow from.
+/// The network, the bandwidths and the limits, which determine the gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ZSourceDesign {
@@ -22,7 +22,7 @@ pub struct ZSourceDesign {
     pub resistance_ohm: f32,
     /// Capacitance of each capacitor, in F, above 0.
     pub capacitance_f: f32,
-    /// From one step to the next, in s, above 0; a duty acts in the period that follows its sample.
+    /// Time from one step to the next, in s, above 0; a duty acts in the period that follows its sample.
     pub period_s: f32,
     /// Bandwidth of the inner loop, in Hz; 1.5 periods of delay at 10 kHz leave 600 Hz 58° of phase.
     pub inner_hz: f32,
@@ -36,9 +36,9 @@ pub struct ZSourceDesign {
     pub inductor_max_a: f32,
 }
 
-/// Bandwidth of the outer loop over the zero in the right half-plane, at most.
+/// Largest ratio of the outer loop's bandwidth to the zero in the right half-plane.
 const ZERO_SHARE: f32 = 0.15;
-/// Slope of the link's reference over the source's voltage, in 1/s: it goes as far in 150 ms.
+/// Slope of the link's reference over the source's voltage, in 1/s: it covers that voltage in 150 ms.
 const SLEW_PER_S: f32 = 6.675;
 
 impl ZSourceDesign {
@@ -58,12 +58,12 @@ impl ZSourceDesign {
         inductor_max_a: 90.0,
     };
 
-    /// The design for a network and two machines of a kind, with the control period in s. The motors' full current is `i = 2 P/U_dc`, the zero in the right half-plane
-    /// lies at `U_dc/(2 i L)` in rad/s.
+    /// The design for a network and two identical machines, with the control period in s. The motors' full current is `i = 2 P/U_dc`; the zero in the right
+    /// half-plane lies at `U_dc/(2 i L)` in rad/s.
     ///
-    /// Quicker than by itself: with the motors' power fed forward the loops only have to catch what is left. Of the paper's network phase
-    /// margins are 52° and about 50°; a load step then moves the link by half as much as with 600 and 80 Hz. Of another one the outer loop
-    /// stays as far below the zero in the right half-plane at the motors' full power.
+    /// Quicker than by itself: with the motors' power fed forward the loops only have to correct the remainder. For the paper's network the phase margins are
+    /// 52° and about 50°; a load step then moves the link by half as much as with 600 and 80 Hz. For another network the outer loop stays as far below the
+    /// zero in the right half-plane at the motors' full power.
     pub const fn of(network: &ZSourceNetwork, ratings: &Ratings, period_s: f32) -> Self {
         let ZSourceNetwork { source_v, inductance_h, resistance_ohm, capacitance_f } = *network;
         let full_a = 2.0 * ratings.max_power_w / source_v;
@@ -121,7 +121,7 @@ pub struct ZSourceInput {
     pub source_v: f32,
     /// Electrical power of both motors, in W; negative while they brake.
     pub power_w: f32,
-    /// Link voltage that is wanted outside shoot-through, U_in*, in V; below U_dc counts as U_dc.
+    /// Wanted link voltage outside shoot-through, U_in*, in V; a value below U_dc counts as U_dc.
     pub link_ref_v: f32,
     /// The duty that the motors leave room for, 0 ..= 1.
     pub duty_room: f32,
@@ -136,15 +136,15 @@ pub struct ZSourceOutput {
     pub duty: f32,
     /// Measured link voltage `2 v_C − U_dc`, in V: what the modulator must divide by.
     pub link_v: f32,
-    /// Link voltage that is led to now, in V: U_in* after the slew.
+    /// Present link reference, in V: U_in* after the slew.
     pub link_ref_v: f32,
-    /// Inductor current that is led to, in A.
+    /// Inductor current reference, in A.
     pub inductor_ref_a: f32,
     /// The limit that holds the duty or the current.
     pub limited: Limited,
 }
 
-/// The direction that the network would take, were it not for a limit.
+/// The direction in which the network would go without a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -188,7 +188,7 @@ impl ZSource {
     /// One period: the duty for the next.
     ///
     /// # Errors
-    /// Where a number would not be finite, or there is no source; the state then stays as it was.
+    /// If a number would not be finite, or there is no source; the state then stays as it was.
     pub fn step(
         &mut self,
         input: &ZSourceInput,
@@ -196,7 +196,7 @@ impl ZSource {
         gains: &ZSourceGains,
     ) -> Result<ZSourceOutput, ZSourceError> {
         let ZSourceInput { capacitor_v, inductor_a, source_v, power_w, link_ref_v, duty_room } = *input;
-        // Not finite if one of them is not.
+        // Not finite if any of them is not.
         if !(capacitor_v + inductor_a + source_v + power_w + link_ref_v + duty_room).is_finite() {
             return Err(ZSourceError::NotFinite);
         }
@@ -233,7 +233,7 @@ impl ZSource {
         } else {
             Limited::Free
         };
-        // What a limit holds back must not pile up in the integral.
+        // The part that a limit holds back must not pile up in the integral.
         let holds_back = match limited {
             Limited::Free => false,
             Limited::Above => error_v > 0.0,

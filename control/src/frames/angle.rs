@@ -75,7 +75,7 @@ impl Angle {
         self.0 as i32
     }
 
-    /// Sine and cosine, absolute error below 1.5e-7: the nearest direction of a table, turned by what is left. No branch.
+    /// Sine and cosine, absolute error below 1.5e-7: the nearest direction of a table, turned by the remainder. No branch.
     #[inline]
     pub fn sin_cos(self) -> SinCos {
         const RAD_PER_UNIT: f32 = core::f32::consts::PI / (UNITS_PER_TURN / 2.0) / STEPS as f32;

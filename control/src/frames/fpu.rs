@@ -8,7 +8,7 @@ pub(super) fn sqrt(x: f32) -> f32 {
 }
 
 /// C's function. The compiler knows what a pure function of this name does and puts the processor's instruction where it is called,
-/// from register to register; assembly has to go by way of the core's registers, because Rust does not offer it the others.
+/// from register to register; assembly has to go through the core's registers, because Rust does not offer it the others.
 #[cfg(target_arch = "arm")]
 #[allow(unsafe_code)]
 #[unsafe(no_mangle)]

@@ -1,4 +1,4 @@
-//! The course of the experiment: the change of current that the next command is to make.
+//! The course of the experiment: the change of current for the next command to make.
 
 use super::followed::Followed;
 use super::inductance::Inductance;
@@ -10,9 +10,9 @@ use crate::machine::Ratings;
 
 /// A half that has passed.
 pub struct Seen {
-    /// Current where it began, in A.
+    /// Current at its beginning, in A.
     pub before: Dq,
-    /// Current where it ended, in A.
+    /// Current at its end, in A.
     pub current: Dq,
     /// Volt-seconds that acted, in V·s.
     pub acted: Dq,
@@ -22,7 +22,7 @@ pub struct Seen {
     pub length_s: f32,
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
-    /// Direction of the rotor's d axis where it ended.
+    /// Direction of the rotor's d axis at its end.
     pub frame: SinCos,
 }
 
@@ -30,21 +30,21 @@ pub struct Seen {
 #[derive(Clone, Copy, Debug)]
 pub struct Course {
     stage: Stage,
-    /// Commands since the stage, or its step, began; and the number of the step.
+    /// Commands since the beginning of the stage or of its step; and the number of the step.
     commands: u32,
     step: u32,
     /// Halves since the last guess of the inductance, in [`Stage::Probe`]; and how its currents follow the volt-seconds.
     waited: u32,
     followed: Followed,
     pulses: Pulses,
-    /// Stator resistance, in ohm, as the staircase has shown it.
+    /// Stator resistance, in ohm, as shown by the staircase.
     resistance_ohm: f32,
-    /// Voltage that each leg lacks in the direction of its current, in V, likewise; and one over the phase current whose direction is sure, per A.
+    /// Voltage that each leg lacks in the direction of its current, in V, likewise; and one over the phase current with a sure direction, per A.
     lacking_v: f32,
     per_small_a: f32,
-    /// The voltage that holds a current beside its drop in that, in V.
+    /// The voltage that holds a current, besides its drop in those, in V.
     held_v: Dq,
-    /// Voltage and current of two steps of the staircase, summed, and how many they are.
+    /// Voltage and current of two steps of the staircase, summed, and their number.
     shown: [Shown; 2],
     /// Electrical speed, in rad/s, and direction of the rotor's d axis.
     omega: f32,
@@ -62,40 +62,40 @@ struct Shown {
 
 const NONE: Dq = Dq { d: 0.0, q: 0.0 };
 
-/// Commands without voltage before the first pulse, which show what the current sensors read where nothing flows.
+/// Commands without voltage before the first pulse, which show the current sensors' readings without current.
 const QUIET: u32 = 40;
-/// Voltage of the first pulse, as a share of the link's largest; the growth of the next, and the halves until then.
+/// Voltage of the first pulse, as a share of the link's largest; the growth to the next one, and the halves until then.
 const FIRST_SHARE: f32 = 0.003;
 const GROWTH: f32 = 1.5;
 const PROBE_HALVES: u32 = 4;
 /// Change of current in a half that is seen above the noise, as a share of the bound.
 const SEEN_SHARE: f32 = 0.015;
-/// Change of current that something is learnt from, likewise.
+/// Change of current from which something is learnt, likewise.
 const LEARNT_SHARE: f32 = 0.006;
 /// Change of current that counts as noise, likewise.
 const NOISE_SHARE: f32 = 0.01;
-/// The change that a probe wants, likewise; the directions of those after the first that was seen, and the change that they want, likewise, of a
-/// machine without saliency; and how many they are.
+/// The change that a probe wants, likewise; the directions of the probes after the first one seen, the change that they want, likewise, for a
+/// machine without saliency, and their number.
 const PROBE_SHARE: f32 = 0.03;
 const AROUND: [[f32; 2]; 4] = [[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]];
 const AROUND_SHARE: f32 = 0.12;
 const PROBES_AROUND: u32 = 24;
-/// Commands that are on their way at most when another one comes.
+/// Most commands that are under way when another one comes.
 const LATE: u32 = 3;
-/// Phase current whose direction is sure, likewise.
+/// Phase current with a sure direction, likewise.
 const SMALL_SHARE: f32 = 0.01;
-/// The longest change of a half on the way to a direct current, likewise.
+/// The largest change in a half on the way to a direct current, likewise.
 const LED_SHARE: f32 = 0.05;
 
 /// Least inductance along d, as a share of the least that was seen: of the first, and once pulses along d have seen all.
 const FLOOR_SHARES: [f32; 2] = [0.2, 0.5];
 
-/// Direct currents along d, as shares of the bound or, negative ones, of the machine's least current along d, and commands for each: first those beside which no current along q takes a rotor back that
-/// turns away. Two of them show the resistance.
+/// Direct currents along d, as shares of the bound or, if negative, of the machine's least current along d, and commands for each. Those come first beside
+/// which no current along q takes back a rotor that turns away. Two of them show the resistance.
 const STAIRCASE: [f32; 8] = [0.1, 0.2, -0.1, -0.25, -0.5, -0.75, -0.9, -0.6];
 const STEP_COMMANDS: u32 = 36;
 const SHOWING: [u32; 2] = [4, 6];
-/// Commands from a step's beginning on after which it shows.
+/// Commands after a step's beginning from which on it shows.
 const SETTLED_COMMANDS: u32 = 18;
 
 /// Commands of the pulses along d, along q, along both, and of the rest after them.
@@ -107,19 +107,19 @@ const REST: u32 = 16;
 /// Shares of the bound at which the pulses along d and along q begin.
 const FIRST_SHARES: [f32; 2] = [0.5, 0.2];
 
-/// Current along d beside the pulses along q and of the turning rotor, as a share of the least one: no phase is without current for long. Beside
-/// the last pulses it goes to and fro between shares of the bound and of that. Ways in a command, at first and growing by as much with each command: no two ways
-/// take as long, so that pulses along q whose to and fro fits into one of them come elsewhere in the next.
+/// Current along d beside the pulses along q and while the rotor turns, as a share of the least one: no phase is without current for long. Beside the last
+/// pulses it goes to and fro between shares of the bound and of that. Ways in a command, at first and growing by as much with each command: no two ways take
+/// equally long, so pulses along q whose to and fro fits into one of them fall elsewhere in the next.
 const HELD_D: f32 = -0.2;
 const SWEPT: [f32; 2] = [0.18, -0.93];
 const SWEEPS: f32 = 1.0 / 265.0;
 const SWEEPS_GROWTH: f32 = 5.3e-7;
 
-/// Turn, mechanical, in rad, by which the rotor is not where it should be before it is to turn: the angle is wrong, or a load turns it. The
-/// experiment is over then.
+/// Distance of the rotor, mechanical, in rad, from where it should be before it is to turn: the angle is wrong, or a load turns it. The
+/// experiment then ends.
 const AWAY_RAD: f32 = 0.087;
 
-/// Current that turns the rotor, as a share of the bound; speed where it ends, as a share of the largest, and as electrical radians a
+/// Current that turns the rotor, as a share of the bound; speed at which it ends, as a share of the largest, and as electrical radians a
 /// command; the most commands for it, and those of coasting.
 const TURN_SHARE: f32 = 0.25;
 const TURN_SPEED_SHARE: f32 = 0.1;
@@ -127,15 +127,15 @@ const TURN_RAD: f32 = 0.03;
 const TURN_COMMANDS: u32 = 3_600;
 const COAST_COMMANDS: u32 = 1_800;
 
-/// Share of the way to a direct current that a command goes, and share of a half's unexplained voltage that is believed to stay.
+/// Share of the way to a direct current that one command covers, and share of a half's unexplained voltage that is assumed to stay.
 const LEAD: f32 = 0.4;
 const HELD: f32 = 0.3;
-/// The latter along d beside pulses along q; the former along q over that along d, for the current that keeps the rotor where it is.
+/// The latter along d beside pulses along q; and the former along q over that along d, for the current that keeps the rotor in place.
 const HELD_BESIDE: f32 = 0.1;
 const STEERED: f32 = 2.0;
 
 impl Course {
-    /// Before the first command.
+    /// The state before the first command.
     pub const fn new() -> Self {
         const NOTHING: Shown = Shown { volts: 0.0, amperes: 0.0, count: 0.0 };
         Self {
@@ -156,7 +156,7 @@ impl Course {
         }
     }
 
-    /// The part of the experiment that is going on.
+    /// The part of the experiment in progress.
     pub fn stage(&self) -> Stage {
         self.stage
     }
@@ -172,7 +172,7 @@ impl Course {
     }
 
     /// Voltage that a current takes by itself, in V, with the rotor's d axis in this direction: the resistance's, the inverter's error, and
-    /// what is left of both.
+    /// the remainder of both.
     pub fn drop_v(&self, current: Dq, frame: SinCos) -> Dq {
         let share = |phase_a: f32| limit(phase_a * self.per_small_a, -1.0, 1.0);
         let Abc { a, b, c } = current.unpark(frame).abc();
@@ -206,7 +206,7 @@ impl Course {
             let is_outward = learns && mean.q * fed.q > 0.0;
             self.pulses.went(is_outward, inductance.flux(change).q / fed.q);
         }
-        // Where a current stands still its changes tell little.
+        // A current that stands still tells little by its changes.
         if learns && !matches!(self.stage, Stage::Probe | Stage::Rest | Stage::Turn | Stage::Done) {
             inductance.learn(change, fed, NOISE_SHARE * bound_a);
         }
@@ -217,7 +217,7 @@ impl Course {
             Stage::AlongQ | Stage::AlongBoth => [HELD_BESIDE, 0.0],
             _ => [0.0; 2],
         };
-        // The voltage that a half leaves unexplained stays in part: on the way to a direct current, and there.
+        // Part of a half's unexplained voltage persists, on the way to a direct current and there.
         let more = (seen.acted - inductance.flux(change)) * (1.0 / seen.length_s) - drop;
         self.held_v = self.held_v + Dq { d: more.d * along_d, q: more.q * along_q };
     }
@@ -226,14 +226,14 @@ impl Course {
     fn probe(&mut self, seen: &Seen, change: Dq, inductance: &mut Inductance, bound_a: f32) {
         let moved = change.squared() > (SEEN_SHARE * bound_a) * (SEEN_SHARE * bound_a);
         if self.step > 0 {
-            // At first what came before is still on its way.
+            // At first the earlier commands are still on their way.
             if self.commands > LATE {
                 self.followed = self.followed.and(change, seen.acted);
             }
         } else if self.commands <= QUIET {
             self.waited = 0;
         } else if moved {
-            // Against its voltage goes no machine's current: then the guess by which it has moved is the better one.
+            // No machine's current goes against its voltage: then the guess by which it has moved is the better one.
             if change.d * seen.acted.d > 0.0 {
                 inductance.learn(change, seen.acted, NOISE_SHARE * bound_a);
             }
@@ -259,7 +259,7 @@ impl Course {
         }
     }
 
-    /// The change of current that the command is to make from what flows `ahead`, with volt-seconds up to `reach` in V·s.
+    /// The change of current that the command is to make from the current `ahead`, with volt-seconds up to `reach` in V·s.
     pub fn change(&mut self, ahead: Dq, reach: f32, inductance: &mut Inductance, ratings: &Ratings) -> Dq {
         let bound_a = ratings.max_current_a;
         if inductance.is_unknown() {
@@ -326,7 +326,7 @@ impl Course {
         first + (last - first) * way
     }
 
-    /// Part of the way to a direct current.
+    /// One command's part of the way to a direct current.
     fn lead(ahead: Dq, wanted: Dq, bound_a: f32) -> Dq {
         let most = LED_SHARE * bound_a;
         let away = wanted - ahead;
@@ -339,13 +339,13 @@ impl Course {
         (self.stage, self.commands, self.step) = (stage, 0, 0);
     }
 
-    /// The end, with no voltage: currents whose sensors tell something else cannot be held.
+    /// The end, without voltage: currents whose sensors read something else cannot be held.
     fn refuse(&mut self) {
         self.enter(Stage::Done);
         self.step = 1;
     }
 
-    /// The next step or stage, where this one is over.
+    /// Goes on to the next step or stage if this one is over.
     fn advance(&mut self, ratings: &Ratings) {
         let after = |limit: u32| self.commands > limit;
         match self.stage {
@@ -393,7 +393,7 @@ impl Course {
         }
     }
 
-    /// Resistance and voltage error, by two steps of the staircase on one side of zero: the error is the same in both.
+    /// Resistance and voltage error from two steps of the staircase on one side of zero: the error is the same in both.
     fn settle(&mut self, bound_a: f32) {
         let [low, high] = self.shown.map(|shown| {
             let per = 1.0 / (shown.count + f32::MIN_POSITIVE);

@@ -1,7 +1,7 @@
-//! The currents as they follow voltages: what tells a machine from current sensors that read something else.
+//! The currents as they follow voltages: they tell a machine from current sensors that read something else.
 //!
 //! Changes of current are volt-seconds times the inverse of the inductance, a symmetric matrix with positive eigenvalues, wherever the rotor stands.
-//! Sensors in another order than the phases turn or mirror it, those of the wrong sign make it indefinite.
+//! Sensors in another order than the phases turn or mirror this matrix; sensors of the wrong sign make it indefinite.
 
 use crate::frames::Dq;
 
@@ -15,16 +15,16 @@ pub struct Followed {
     squares: Dq,
 }
 
-/// Largest asymmetry, as a share of the trace; of sensors in another order it is 1.7.
+/// Largest asymmetry, as a share of the trace; with sensors in another order it is 1.7.
 const ASYMMETRY: f32 = 0.5;
 
 const NONE: Dq = Dq { d: 0.0, q: 0.0 };
 
 impl Followed {
-    /// Before the first pulse.
+    /// The sums before the first pulse.
     pub const NOTHING: Self = Self { by_d: NONE, by_q: NONE, squares: NONE };
 
-    /// With one more pulse.
+    /// The sums with one more pulse.
     pub fn and(self, change: Dq, acted: Dq) -> Self {
         Self {
             by_d: self.by_d + change * acted.d,
@@ -33,7 +33,7 @@ impl Followed {
         }
     }
 
-    /// `true` if it is a machine's.
+    /// `true` if the sums are a machine's.
     pub fn is_machine(self) -> bool {
         let (by_d, by_q) = (self.by_d * self.squares.q, self.by_q * self.squares.d);
         let (trace, skew) = (by_d.d + by_q.q, by_q.d - by_d.q);
@@ -62,7 +62,7 @@ mod tests {
                 .is_machine()
         };
         assert!(of(16.0, 0.0, 0.0, 1.0) && of(15.5, 2.56, 2.56, 1.45) && of(1.0, 0.0, 0.0, 1.0));
-        // All of the wrong sign, two exchanged, one of the wrong sign, in another order, in another order and of the wrong sign.
+        // All of the wrong sign; two exchanged; one of the wrong sign; in another order; in another order and of the wrong sign.
         assert!(!of(-1.0, 0.0, 0.0, -1.0) && !of(1.0, 0.0, 0.0, -1.0) && !of(-1.0 / 3.0, 0.0, 0.0, 1.0));
         assert!(!of(-0.5, 0.866, -0.866, -0.5) && !of(0.5, 0.866, -0.866, 0.5));
         assert!(!Followed::NOTHING.is_machine());

@@ -1,9 +1,9 @@
-//! Observations of the turn, gathered: a rotor that turns slowly is seen for longer, with the same memory.
+//! Observations of the turn, gathered: a rotor that turns slowly is observed for longer with the same memory.
 
 use super::observation::Observation;
 use crate::frames::AlphaBeta;
 
-/// The sum of all that has acted since the last observation that was told.
+/// The sum of everything that has acted since the last observation was told.
 #[derive(Clone, Copy, Debug)]
 pub struct Gathered {
     volt_seconds: AlphaBeta,
@@ -11,15 +11,15 @@ pub struct Gathered {
     boundaries: u32,
 }
 
-/// Boundaries in an observation of the turn. A boundary's is two halves long at most, a packed observation seven.
+/// Boundaries in an observation of the turn. A boundary's is at most two halves long, a packed observation seven.
 const BOUNDARIES: u32 = 3;
 
 impl Gathered {
-    /// Before the first.
+    /// The sum before the first boundary.
     pub const NOTHING: Self =
         Self { volt_seconds: AlphaBeta { alpha: 0.0, beta: 0.0 }, length_s: 0.0, boundaries: 0 };
 
-    /// Takes a boundary's; the sum of all since the last one, where it is to be told.
+    /// Takes a boundary's observation; returns the sum of all since the last one when it is to be told.
     pub fn take(&mut self, observation: Observation) -> Option<Observation> {
         self.volt_seconds = self.volt_seconds + observation.volt_seconds;
         self.length_s += observation.length_s;

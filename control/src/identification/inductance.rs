@@ -13,12 +13,12 @@ struct Matrix {
 impl Matrix {
     const NOTHING: Self = Self { dd: 0.0, dq: 0.0, qq: 0.0 };
 
-    /// This one with all that another knows in its place.
+    /// This matrix, with everything that another one knows in its place.
     fn and(self, other: Self) -> Self {
         self.with(other, [other.dd > 0.0, other.qq > 0.0])
     }
 
-    /// This one with another's along d, and along q, in its place.
+    /// This matrix, with another's values along d, and along q, in their place.
     fn with(self, other: Self, [d, q]: [bool; 2]) -> Self {
         let dd = if d { other.dd } else { self.dd };
         let [dq, qq] = if q { [other.dq, other.qq] } else { [self.dq, self.qq] };
@@ -26,18 +26,18 @@ impl Matrix {
     }
 }
 
-/// Share of what a half shows that is believed at once.
+/// Share of a half's evidence that is believed at once.
 const GAIN: f32 = 0.7;
-/// Weight of the coupling of both axes beside their own inductances, where a change of current does not tell them apart.
+/// Weight of the coupling of both axes beside their own inductances, if a change of current does not tell them apart.
 const COUPLING_WEIGHT: f32 = 0.08;
 /// Square of the largest coupling, as a share of the product of the own inductances.
 const COUPLING: f32 = 0.6;
-/// Least and most of an own inductance that a half may leave of what was known before; and the least of all along q, of the least along d.
+/// Least and most of an own inductance, as shares of its previous value, after a half; and the least of all along q, as a share of the least along d.
 const LEAST_SHARE: f32 = 0.4;
 const MOST_SHARE: f32 = 1.4;
 const FLOOR_SHARE: f32 = 0.5;
 
-/// Fields of the plane of currents, in which each inductance is remembered: along d from beyond the bound on, along q for both signs.
+/// Fields of the plane of currents in which each inductance is remembered: along d from beyond the bound on, along q for both signs.
 const ALONG_D: usize = 9;
 const ALONG_Q: usize = 8;
 /// Fields in a bound of current.
@@ -52,7 +52,7 @@ pub struct Inductance {
     here: Matrix,
     field: usize,
     fields: [Matrix; ALONG_D * ALONG_Q],
-    /// The newest of each current along q, whatever flows along d: iron saturates along q with it.
+    /// The newest inductance for each current along q, whatever flows along d: iron saturates along q with it.
     along_q: [Matrix; ALONG_Q],
     /// Share of the coupling that acts here: odd in the current along q.
     coupled: f32,
@@ -61,7 +61,7 @@ pub struct Inductance {
 }
 
 impl Inductance {
-    /// Nothing is known: no voltage is the answer to any change of current.
+    /// Nothing is known: any change of current is answered with no voltage.
     pub const UNKNOWN: Self = Self::round(0.0);
 
     /// The same along both axes and at every current, in H.
@@ -82,18 +82,18 @@ impl Inductance {
         self.here.dd <= 0.0
     }
 
-    /// Takes the same along both axes, in H, where nothing is known.
+    /// Takes the same inductance along both axes, in H, while nothing is known.
     pub fn guess(&mut self, henry: f32) {
         self.here = Matrix { dd: henry, dq: 0.0, qq: henry };
     }
 
-    /// Takes another multiple of it.
+    /// Scales that inductance by a factor.
     pub fn scale(&mut self, by: f32) {
         let Matrix { dd, dq, qq } = self.here;
         self.here = Matrix { dd: dd * by, dq: dq * by, qq: qq * by };
     }
 
-    /// The least that was seen along d so far is the measure of the least of all: along d this share of it.
+    /// Makes the least inductance seen along d so far the measure of the least of all: along d this share of it.
     pub fn settle(&mut self, share: f32) {
         let mut least_h = self.here.dd;
         // Without current along q: the first field of each row.
@@ -105,12 +105,12 @@ impl Inductance {
         self.floor_h = Dq { d: share * least_h, q: FLOOR_SHARE * least_h };
     }
 
-    /// Moves to a current, in A: of each part of the matrix what is remembered of the current holds; else what is of its part along q, else that
-    /// from where it comes.
+    /// Moves to a current, in A. For each part of the matrix, the value remembered for this current holds; else the one remembered for its part along q; else
+    /// the one from where it comes.
     pub fn at(&mut self, current: Dq, bound_a: f32) {
         let per_a = PER_BOUND / bound_a;
         self.coupled = limit(current.q * per_a, -1.0, 1.0);
-        // What is below 0 the conversion makes 0.
+        // The conversion makes 0 of what is below 0.
         let row = ((MIDDLE_D + current.d * per_a) as usize).min(ALONG_D - 1);
         let column = ((current.q.abs() * per_a) as usize).min(ALONG_Q - 1);
         let field = row * ALONG_Q + column;
@@ -121,21 +121,21 @@ impl Inductance {
         }
     }
 
-    /// Flux linkage, in Wb, of a change of current, in A.
+    /// Flux linkage, in Wb, for a change of current, in A.
     pub fn flux(&self, change: Dq) -> Dq {
         let Matrix { dd, dq, qq } = self.here;
         let dq = dq * self.coupled;
         Dq { d: dd * change.d + dq * change.q, q: dq * change.d + qq * change.q }
     }
 
-    /// Flux linkages, in Wb, of the parts of a change of current along d and along q, in A.
+    /// Flux linkages, in Wb, for the parts of a change of current along d and along q, in A.
     pub fn fluxes(&self, change: Dq) -> [Dq; 2] {
         let Matrix { dd, dq, qq } = self.here;
         let dq = dq * self.coupled;
         [Dq { d: dd * change.d, q: dq * change.d }, Dq { d: dq * change.q, q: qq * change.q }]
     }
 
-    /// Change of current, in A, of a flux linkage, in Wb; none while nothing is known.
+    /// Change of current, in A, for a flux linkage, in Wb; none while nothing is known.
     pub fn current(&self, flux: Dq) -> Dq {
         let Matrix { dd, dq, qq } = self.here;
         let dq = dq * self.coupled;
@@ -146,7 +146,7 @@ impl Inductance {
         Dq { d: qq * flux.d - dq * flux.q, q: dd * flux.q - dq * flux.d } * (1.0 / determinant)
     }
 
-    /// A change of current was seen to take so much flux linkage; changes of so little, in A, are noise. The matrix moves by the least
+    /// Learns that a change of current took so much flux linkage; changes of so little, in A, are noise. The matrix moves by the least
     /// that explains a share of it, the coupling less readily than the rest.
     pub fn learn(&mut self, change: Dq, flux: Dq, noise_a: f32) {
         let left = flux - self.flux(change);
@@ -168,7 +168,7 @@ impl Inductance {
         let most = COUPLING * dd * qq;
         let dq = if dq * dq > most { dq * (most / (dq * dq)) } else { dq };
         self.here = Matrix { dd, dq, qq };
-        // A part that no change has shown is not remembered: elsewhere it would stand for what is known better. Of 56 experiments with an L_q that
+        // A part that no change has shown is not remembered: elsewhere it would replace what is known better. Of 56 experiments with an L_q that
         // falls to 0.4 of itself 5 would go a tenth beyond the bound.
         let shown = [d * d > noise, q * q > noise];
         if let Some(field) = self.fields.get_mut(self.field) {
@@ -221,7 +221,7 @@ mod tests {
         assert!((found.here.qq - 9e-3).abs() < 1e-4, "{:?}", found.here);
     }
 
-    /// A change of current along one axis is remembered of that axis alone: what is known of the other one stays.
+    /// A change of current along one axis is remembered for that axis alone: what is known of the other one stays.
     #[test]
     fn what_no_change_has_shown_is_not_remembered() {
         let (bound_a, nowhere) = (100.0, Dq { d: 0.0, q: 0.0 });

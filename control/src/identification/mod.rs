@@ -1,19 +1,19 @@
 //! Identification of a machine by its own drive: a control law whose voltages are an experiment.
 //!
-//! The law knows of the machine its ratings alone: pole pairs, largest current, largest speed; neither its flux map nor its resistance. It
-//! wants so much change of current from each command, finds out which volt-seconds that takes, and tells at each carrier boundary what
+//! The law knows only the machine's ratings: pole pairs, largest current, largest speed; neither its flux map nor its resistance. It
+//! wants a certain change of current from each command, finds out which volt-seconds that takes, and tells at each carrier boundary what
 //! acted and what flowed ([`Observation`]). The map is fitted elsewhere.
 //!
 //! 1. **Probe**: pulses along d, longer each time, until a current moves.
-//! 2. **Staircase**: direct currents along d, which give no torque: stator resistance and the inverter's voltage error. Where they turn a free
-//!    rotor the angle's zero is off: a current along q takes it back, and the frame turns until none is needed.
-//! 3. **Pulses** along d, along q, along both: alternating voltages that are reversed where the current would leave the bound at the end
-//!    of the half that is commanded. The torque of one sign follows that of the other, and the side that has turned the rotor further is
+//! 2. **Staircase**: direct currents along d, which give no torque: stator resistance and the inverter's voltage error. If they turn a free
+//!    rotor, the angle's zero is off: a current along q brings the rotor back, and the frame turns until none is needed.
+//! 3. **Pulses** along d, along q, along both: alternating voltages that are reversed when the current would leave the bound at the end
+//!    of the commanded half. Torque of one sign follows torque of the other, and the side that has turned the rotor further is
 //!    given less: a free rotor swings, and stays where it is.
 //! 4. **Turn**: a little torque until the rotor turns slowly, no current for a while, and the same torque against it: the magnets'
 //!    flux and the inertia.
 //!
-//! The stator equation in the stationary frame, from boundary to boundary, `Δψ = ∫u dt − R ∫i dt`, holds whatever the rotor does meanwhile.
+//! From boundary to boundary, the stator equation in the stationary frame, `Δψ = ∫u dt − R ∫i dt`, holds whatever the rotor does meanwhile.
 
 #![forbid(unsafe_code)]
 
@@ -53,10 +53,10 @@ pub struct Identification {
     course: Course,
     /// Incremental inductance where the current is.
     inductance: Inductance,
-    /// The current of the newest boundary in A, and the direction of the rotor's d axis there as the angle says.
+    /// The current of the newest boundary in A, and the direction of the rotor's d axis there by the angle.
     last: Option<(Dq, SinCos)>,
-    /// The current in the middle of the way that the newest command makes, in A: its inductance is the way's. By that of the way's beginning 13 of 56
-    /// experiments with an L_q that falls to 0.4 of itself go a tenth beyond the bound, none by this one.
+    /// The current in the middle of the way made by the newest command, in A: its inductance is the way's. With that of the way's beginning, 13 of 56
+    /// experiments with an L_q that falls to 0.4 of itself go a tenth beyond the bound; with this one, none.
     middle: Dq,
     told: Option<Observation>,
     gathered: Gathered,
@@ -91,12 +91,12 @@ impl Identification {
         self.told.take()
     }
 
-    /// The part of the experiment that is going on.
+    /// The part of the experiment in progress.
     pub fn stage(&self) -> Stage {
         self.course.stage()
     }
 
-    /// The voltage that changes a current by so much within an interval, without more than the limit.
+    /// The voltage that changes a current by so much within an interval, within the limit.
     fn voltage(&self, ahead: Dq, change: Dq, frame: SinCos, interval_s: f32) -> Dq {
         let drop = self.course.drop_v(ahead + change * 0.5, frame);
         let wanted = self.inductance.flux(change) * (1.0 / interval_s) + drop;
@@ -186,7 +186,7 @@ impl ControlLaw for Identification {
         _limits: &ModeLimits,
         law: &Law,
     ) -> VoltageVector {
-        // Gates that are still off begin with no voltage.
+        // Gates that are still off begin without voltage.
         let (here, frame) = self.course.zero().seen(sample.current, sample.frame);
         let voltage = committed.volt_seconds.map_or(NONE, |volt_seconds| {
             let interval_s = committed.interval_s;

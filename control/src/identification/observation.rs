@@ -1,4 +1,4 @@
-//! The words that an identification tells, one observation a carrier boundary.
+//! The words reported by an identification, one observation per carrier boundary.
 
 use crate::frames::{AlphaBeta, Dq, SinCos};
 use crate::named;
@@ -48,7 +48,7 @@ pub struct Observation {
 pub const OBSERVATION_WORDS: usize = 9;
 
 impl Observation {
-    /// As words.
+    /// The observation as words.
     pub fn to_words(self) -> [u32; OBSERVATION_WORDS] {
         let numbers = [
             self.volt_seconds.alpha,
@@ -64,7 +64,7 @@ impl Observation {
         [self.stage as u32, alpha, beta, length, d, q, sin, cos, udc]
     }
 
-    /// Of words; `None` if the stage is none.
+    /// The observation of words; `None` if the stage is none.
     pub fn from_words(words: [u32; OBSERVATION_WORDS]) -> Option<Self> {
         let [stage, alpha, beta, length, d, q, sin, cos, udc] = words;
         let number = f32::from_bits;

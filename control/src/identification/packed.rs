@@ -1,4 +1,4 @@
-//! Observations in three words, as a drive keeps them until a bus has carried them off.
+//! Observations in three words, as a drive keeps them until a bus has carried them away.
 
 use super::observation::{Observation, Stage};
 use crate::frames::{AlphaBeta, Angle, Dq};
@@ -11,7 +11,7 @@ pub const PACKED_WORDS: usize = 3;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Packed(pub [u32; PACKED_WORDS]);
 
-/// The units of packed observations, which follow from a machine's ratings: a drive's and its listener's are the same.
+/// The units of packed observations, which follow from a machine's ratings: a drive and its listener have the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
     /// In V·s.
@@ -46,13 +46,13 @@ fn pair(first: i32, second: i32) -> u32 {
     u32::from(first as u16) | u32::from(second as u16) << 16
 }
 
-/// The numbers of such a word.
+/// The numbers in such a word.
 fn numbers(word: u32) -> [f32; 2] {
     [word as u16, (word >> 16) as u16].map(|half| f32::from(half as i16))
 }
 
 impl Units {
-    /// Of a machine: currents to twice the trip level, volt-seconds to a whole carrier at the link's, which is more than any vector has.
+    /// The units for a machine: currents to twice the trip level, volt-seconds to a whole carrier at the link's, which is more than any vector has.
     pub const fn of(ratings: &Ratings) -> Self {
         let half_s = 0.5 / ratings.max_switching_hz;
         Self {
@@ -63,7 +63,7 @@ impl Units {
         }
     }
 
-    /// In three words.
+    /// The observation in three words.
     pub fn pack(&self, observation: &Observation) -> Packed {
         let Observation { stage, volt_seconds, length_s, current, frame, udc_v } = *observation;
         let signed = |value: f32, unit: f32| steps(value, unit, STEPS);
@@ -80,7 +80,7 @@ impl Units {
         ])
     }
 
-    /// Of three words.
+    /// The observation of three words.
     pub fn unpack(&self, Packed([volts, amperes, last]): Packed) -> Observation {
         let [alpha, beta] = numbers(volts).map(|steps| steps * self.volt_seconds);
         let [d, q] = numbers(amperes).map(|steps| steps * self.current_a);

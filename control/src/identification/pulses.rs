@@ -1,4 +1,4 @@
-//! Alternating pulses within a bound of current, by which a free rotor swings and stays where it is.
+//! Alternating pulses within a bound of current, under which a free rotor swings and stays where it is.
 
 use super::course::Seen;
 use super::inductance::Inductance;
@@ -9,7 +9,7 @@ use crate::machine::Ratings;
 pub struct Region<'a> {
     /// Pulses along q, or else along d.
     pub along_q: bool,
-    /// The current where an axis without pulses is held, in A.
+    /// The current at which an axis without pulses is held, in A.
     pub held: Dq,
     /// Largest current, in A.
     pub bound_a: f32,
@@ -30,10 +30,10 @@ pub struct Pulses {
     omega: f32,
     /// Length of a half, in s.
     length_s: f32,
-    /// Share of the bound that the next pulse may come to; and the one that the current has come into.
+    /// Share of the bound that the next pulse may reach, and the one that the current has reached.
     share: f32,
     within: f32,
-    /// The change along q that the newest half on the way outward made, over the one that was expected of it, from 1.
+    /// The change along q made by the newest half on the way outward, over the expected one, from 1.
     further: f32,
 }
 
@@ -43,40 +43,40 @@ const Q_SHARE: f32 = 0.058;
 const SLOW_SHARE: f32 = 0.017;
 /// Share of the volt-seconds that d takes at most.
 const D_REACH: f32 = 0.7;
-/// Share of the way to where an axis without pulses is held that a command goes.
+/// Share of the way to the held current of an axis without pulses that one command covers.
 const HELD_SHARE: f32 = 0.4;
-/// Part of their share of the bound that the boundaries' currents keep to: between them there is ripple. What each command adds to the share:
-/// outward step by step, so that each step is known from the one before it. By how much less it becomes, over what a current was seen beyond it
-/// and more than is tolerated: where iron saturates much the next pulse may go further.
+/// Part of their share of the bound that the boundaries' currents keep to: between them there is ripple. Increase of the share with each command:
+/// outward step by step, so that each step is known from the one before it. Decrease of the share over the current seen beyond it
+/// and beyond the tolerance: if iron saturates much, the next pulse may go further.
 const KEPT_SHARE: f32 = 0.964;
 const WIDENING: f32 = 0.003;
 const OVER_GAIN: f32 = 8.0;
 const TOLERATED_SHARE: f32 = 0.02;
 /// Share of the bound within which a change of current is too coarse to tell: the least that this leaves.
 const FAR_SHARE: f32 = 0.6;
-/// The change along q that a command may make where the iron saturates as the current goes outward, over the one that it is to make.
+/// The change along q that a command may make if the iron saturates as the current goes outward, over the intended one.
 const OUTWARD: f32 = 1.7;
-/// Largest change of a half on the way outward, over the one that was expected of it, that is believed.
+/// Largest change in a half on the way outward, over the expected one, that is believed.
 const FURTHEST: f32 = 2.0;
 /// Largest current along +d, as a share of the bound.
 const POSITIVE_SHARE: f32 = 0.2;
 /// Turn, mechanical, at which the side that makes it is given no more, in rad; and the time over which the speed counts: so many halves, for the
-/// pulse that is under way, and a time in s, by which the swing of any rotor is damped.
+/// pulse under way, and a time in s that damps the swing of any rotor.
 const MOST_RAD: f32 = 0.028;
 const AHEAD_HALVES: f32 = 6.0;
 const AHEAD_S: f32 = 0.02;
 /// Least share of the bound that a side keeps.
 const LEAST_SIDE: f32 = 0.1;
-/// Current along q that takes the rotor back beside currents along d, as a share of the bound: at the most turn that there is to be, and at most,
+/// Current along q that takes the rotor back beside currents along d, as a share of the bound: at the largest permitted turn, and at most,
 /// which saturates no iron that is not known yet.
 const BACK_GAIN: f32 = 0.15;
-/// The part of that turn up to which a rotor stays where it is by itself.
+/// The part of that turn up to which a rotor stays in place by itself.
 const STAYS: f32 = 0.2;
 const BACK_S: f32 = 0.025;
 const BACK_SHARE: f32 = 0.15;
 
 impl Pulses {
-    /// Before the first pulse.
+    /// The state before the first pulse.
     pub const fn new() -> Self {
         Self {
             d: -1.0,
@@ -95,17 +95,17 @@ impl Pulses {
         number / self.length_s
     }
 
-    /// Begins with pulses that come to a share of the bound.
+    /// Begins with pulses up to a share of the bound.
     pub fn begin(&mut self, share: f32) {
         (self.share, self.within) = (share, share);
     }
 
-    /// The share of the bound that the next pulse may come to.
+    /// The share of the bound that the next pulse may reach.
     pub fn share(&self) -> f32 {
         self.share
     }
 
-    /// Notes by how much the rotor has turned in a half, and whether the current has gone beyond its bound, in A.
+    /// Notes the rotor's turn in a half, and whether the current has gone beyond its bound, in A.
     pub fn turned(&mut self, seen: &Seen, bound_a: f32) {
         let over = seen.current.length() / bound_a - self.within - TOLERATED_SHARE;
         if self.within > FAR_SHARE && over > 0.0 {
@@ -115,8 +115,8 @@ impl Pulses {
         self.omega = seen.omega;
     }
 
-    /// Notes the change along q that a half made, over what was expected of it. The next one outward is asked for less, by its fourth power: what iron
-    /// saturates as the current goes outward, it saturates the more in the half that is commanded and the one behind it. Without this three of 168 experiments whose L_q falls to
+    /// Notes the change along q made by a half, over the expected one. The next one outward is asked for less, by its fourth power: iron that saturates as the
+    /// current goes outward saturates even more in the half that is commanded and the one behind it. Without this, three of 168 experiments whose L_q falls to
     /// 0.4 of itself went beyond 1.1 of the bound of current, by up to 1.18; now none.
     pub fn went(&mut self, is_outward: bool, over_expected: f32) {
         self.further = if is_outward { limit(over_expected, 1.0, FURTHEST) } else { 1.0 };
@@ -127,14 +127,14 @@ impl Pulses {
         self.turned_rad
     }
 
-    /// The turn that there is soon, over the most that there is to be.
+    /// The turn expected soon, over the largest permitted one.
     fn away(&self, pole_pairs: f32, ahead_s: f32) -> f32 {
         let comes = self.turned_rad + self.omega * ahead_s;
         comes / (pole_pairs * MOST_RAD)
     }
 
-    /// The current along q over the bound that takes the rotor back to where it was, beside a negative one along d. Where currents that are to
-    /// lie along d turn the rotor, as its angle's zero is off, it comes to rest where this one takes their torque away.
+    /// The current along q over the bound that takes the rotor back to where it was, beside a negative one along d. If currents meant to
+    /// lie along d turn the rotor, because its angle's zero is off, the rotor comes to rest where this current cancels their torque.
     pub fn back_share(&self, pole_pairs: f32) -> f32 {
         let away = self.away(pole_pairs, BACK_S);
         limit(-BACK_GAIN * (away - limit(away, -STAYS, STAYS)), -BACK_SHARE, BACK_SHARE)
@@ -145,7 +145,7 @@ impl Pulses {
         self.length_s = length_s;
     }
 
-    /// The change of current that the command is to make from what flows `ahead`: on as before, unless that would leave the region.
+    /// The change of current that the command is to make from the current `ahead`: on as before, unless that would leave the region.
     pub fn change(&mut self, ahead: Dq, region: &Region, inductance: &Inductance) -> Dq {
         let bound_a = self.share * KEPT_SHARE * region.bound_a;
         if ahead.squared() <= bound_a * bound_a {
@@ -209,7 +209,7 @@ impl Pulses {
     }
 }
 
-/// A change of current, shortened to what the volt-seconds can make of it: what d takes is left for q.
+/// A change of current, shortened to what the volt-seconds can make of it: what d leaves of them is for q.
 fn reached(change: Dq, reach: f32, inductance: &Inductance) -> Dq {
     let [takes_d, takes_q] = inductance.fluxes(change).map(Dq::length);
     let d = if takes_d > D_REACH * reach { change.d * (D_REACH * reach / takes_d) } else { change.d };

@@ -2,29 +2,29 @@
 
 use crate::frames::{Angle, Dq, SinCos, limit};
 
-/// The angle by which the d axis lies ahead of where the angle says that it is.
+/// The angle by which the d axis lies ahead of the measured angle.
 #[derive(Clone, Copy, Debug)]
 pub struct Zero {
-    /// In rad, electrical.
+    /// The angle in rad, electrical.
     rad: f32,
-    /// Square of the current along d over the bound, summed over the time that has shown something, in s.
+    /// Square of the current along d over the bound, integrated over the time that has shown something, in s.
     seen_s: f32,
     ahead: SinCos,
 }
 
-/// The weight of the angle as it is read, as a time with the bound along d, in s; and the most that the frame turns, in rad: 20°.
+/// The weight of the angle as read, as a time with the bound along d, in s; and the largest turn of the frame, in rad: 20°.
 const KNOWN_S: f32 = 0.02;
 const MOST_RAD: f32 = 0.35;
 
 impl Zero {
-    /// A zero that is where the angle says.
+    /// A zero exactly where the angle says.
     pub const fn new() -> Self {
         Self { rad: 0.0, seen_s: KNOWN_S, ahead: SinCos { sin: 0.0, cos: 1.0 } }
     }
 
-    /// Turns the frame while a current along q, over the bound, is needed beside so much along d, over the bound, to keep the rotor where it is: by
-    /// least squares over all of them, so that it is quick at first. Swings by pulses along q are their own torque's and show no zero: what they
-    /// taught turned the frame, and with it the current along d, which made the swings grow.
+    /// Turns the frame as long as a current along q, over the bound, is needed beside so much along d, over the bound, to keep the rotor in place: by
+    /// least squares over all of them, so it is quick at first. Swings by pulses along q come from their own torque and show no zero: learning from them
+    /// turned the frame, and with it the current along d, which made the swings grow.
     pub fn turn(&mut self, back_share: f32, d_share: f32, length_s: f32) {
         if back_share == 0.0 {
             return;

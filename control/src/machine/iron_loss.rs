@@ -3,8 +3,8 @@
 /// Electrical speed below which hysteresis fades, in rad/s.
 const LEAST_RAD_S: f32 = 2.0;
 
-/// The iron of a machine: `T = |ψ|² (h sign ω + e ω)`. Hysteresis loses the same in every turn, eddy currents the more the faster it is, both by the
-/// square of the flux linkage. The currents know nothing of it.
+/// The iron of a machine: `T = |ψ|² (h sign ω + e ω)`. Hysteresis loses the same in every turn, eddy currents the more the faster it turns, both with the
+/// square of the flux linkage. The currents show nothing of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct IronLoss {

@@ -1,5 +1,5 @@
-//! Interpolation in evenly spaced tables. Outside its axis a table holds its edge value's line (linear
-//! extrapolation of the last cell), so that a map keeps its slope and stays invertible; a NaN index gives NaN.
+//! Interpolation in evenly spaced tables. Outside its axis a table continues the line of its last cell (linear
+//! extrapolation), so that a map keeps its slope and stays invertible; a NaN index gives NaN.
 
 /// A table over one axis: node `k` stands at `first + k / inverse_step`.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +31,7 @@ pub struct Grid<const N: usize> {
     pub nodes: &'static [[f32; N]],
 }
 
-/// Position on an axis, in cells. The axis' beginning in cells is known to the compiler where the table is.
+/// Position on an axis, in cells. The compiler knows the axis' beginning in cells if it knows the table.
 #[inline(always)]
 fn position(x: f32, first: f32, inverse_step: f32) -> f32 {
     x * inverse_step - first * inverse_step
@@ -45,7 +45,7 @@ fn cell(position: f32, count: usize) -> (usize, f32) {
     (index, position - index as f32)
 }
 
-/// Two neighbouring nodes and what lies between them; NaN where the table is shorter than it says: NaN ends in a named fault, not
+/// The value between two neighbouring nodes; NaN if the table is shorter than it says: NaN ends in a named fault, not
 /// in a panic.
 #[inline(always)]
 fn between<const N: usize>(nodes: &[[f32; N]], index: usize, fraction: f32) -> [f32; N] {

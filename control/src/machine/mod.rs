@@ -54,14 +54,14 @@ pub struct Ratings {
     pub torque_slew_nm_s: f32,
     /// Largest acceleration of the rotor, electrical, in rad/s²: that of the largest torque on its inertia.
     pub max_acceleration_rad_s2: f32,
-    /// Iron loss, were all of the loss that the folder names the iron's.
+    /// Iron loss, if all of the loss that the folder names were the iron's.
     pub iron: IronLoss,
     /// The iron's share of that loss, 0 ..= 1, as far as it is known.
     pub iron_share: f32,
 }
 
 impl Ratings {
-    /// The demagnetisation limit, in A; `None` where there is none. Inlined, so that the compiler leaves it out of an image whose machine has
+    /// The demagnetisation limit, in A; `None` if there is none. Inlined, so that the compiler leaves it out of an image whose machine has
     /// none.
     #[inline(always)]
     pub const fn least_id_a(&self) -> Option<f32> {
@@ -70,7 +70,7 @@ impl Ratings {
 
     /// `true` for a machine with magnets: without them the rotor is the same after half an electrical turn.
     pub const fn has_magnets(&self) -> bool {
-        // Less is the tables' rounding.
+        // Less is rounding of the tables.
         self.magnet_flux_wb > 1e-9
     }
 
@@ -94,7 +94,7 @@ pub struct Mtpa {
     /// Both are kept positive by the generator, also for a machine without magnets or without saliency.
     pub parameters: Grid<2>,
     /// `[i_d start, i_q start, i_d trim, i_q trim]`, in A, over |T| in N·m (0 ..= largest torque): the
-    /// point where the first pass reads `parameters`, and what is added to the second pass' result.
+    /// point at which the first pass reads `parameters`, and the addition to the second pass' result.
     pub start: Curve<4>,
     /// `[along, across]`, in N·m/Wb², over |T| likewise: the excess of mean torque over a flux ripple around the MTPA point beyond the torque
     /// there, over the ripple's mean square along the flux linkage and across it: half of the torque's second differences.
@@ -104,8 +104,8 @@ pub struct Mtpa {
 /// Field-weakening tables: the constant-torque curves cut with circles of constant flux linkage.
 ///
 /// A circle stands at `x = psi / (psi + flux_knee_wb)`, a torque on it at `y = w / (w + share_knee)` with
-/// `w = 1 − √(1 − |T|/T_circle)`: nodes stand closer where there is little flux, and where there is little torque. What is read
-/// between the nodes has no more flux linkage and no more current than was asked for.
+/// `w = 1 − √(1 − |T|/T_circle)`: nodes stand closer where there is little flux or little torque. Values read
+/// between the nodes have no more flux linkage and no more current than was asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct Weakening {
     /// `[i_d, psi_T]`, in A and Wb, over (`x`, `y`): with the effective flux linkage `psi_T = T/(1.5 n_p i_q)`, above zero, i_q
@@ -115,9 +115,9 @@ pub struct Weakening {
     /// the most on it or inside it, both within the current limit; how fast that grows, at least; and the square of a
     /// current on that circle exceeds that of the MTPA point of the same torque by `a + b w` at most.
     pub torque: Curve<5>,
-    /// Flux linkage where `x` is one half, in Wb.
+    /// Flux linkage at which `x` is one half, in Wb.
     pub flux_knee_wb: f32,
-    /// `w` where `y` is one half.
+    /// `w` at which `y` is one half.
     pub share_knee: f32,
 }
 
@@ -152,7 +152,7 @@ pub struct ZSourceNetwork {
     pub capacitance_f: f32,
 }
 
-/// The source of a task's tables: behind a reference where they are made at run time; in an image behind a type without fields, so that the
+/// The source of a task's tables: a reference if they are made at run time; in an image a type without fields, so that the
 /// compiler knows every number of them.
 pub trait Machine: Copy {
     /// The tables.

@@ -1,13 +1,13 @@
 //! The modes with a triangular carrier: SPWM with the min-max zero sequence, sampled twice per carrier.
 //!
 //! Even halves rise from the valley (all upper devices on) to the peak (all off), odd halves fall. The
-//! reference is sampled in the middle of its half, where the mean of a turning vector over the half stands.
+//! reference is sampled in the middle of its half, where a turning vector has its mean over the half.
 
 use super::{CarrierHalf, Reference, SwitchLimits};
 use crate::frames::{Abc, AlphaBeta};
 use crate::time::Instant;
 
-/// A half of the asynchronous carrier, from an instant and so many ticks long, with volt-ticks over the link's voltage besides.
+/// A half of the asynchronous carrier that begins at an instant and lasts so many ticks, with additional volt-ticks over the link's voltage.
 pub fn asynchronous(
     half: u32,
     (start, period_ticks): (Instant, u32),
@@ -27,13 +27,13 @@ pub enum Zeros {
     /// Most at the start: in the last half before a pattern, so that the flux goes more or less straight to where the pattern
     /// begins, not far beyond and back.
     Early,
-    /// Most at the end: in the first half after a pattern, which leaves the flux at its farthest; braking, zero voltage would
+    /// Most at the end: in the first half after a pattern, which leaves the flux at its farthest; when braking, zero voltage would
     /// lead it farther still.
     Late,
 }
 
 impl Zeros {
-    /// Share of the zero vectors at the start. The early one and the late one are compromises: motoring wants more, braking less.
+    /// Share of the zero vectors at the start. Early and late are compromises: motoring wants more, braking less.
     const fn at_start(self) -> f32 {
         match self {
             Self::Even => 0.5,
@@ -43,7 +43,7 @@ impl Zeros {
     }
 }
 
-/// A half of a given length, wherever it lies in the turn, whose mean voltage is a share of the link's.
+/// A half of a given length, anywhere in the turn, whose mean voltage is a share of the link's.
 pub fn synchronous(
     half: u32,
     period_ticks: u32,
@@ -64,7 +64,7 @@ pub fn synchronous(
 }
 
 /// The share of the half for which each upper device is on, 0 ..= 1, for a voltage as a share of the link's, with a share
-/// `all_on` of the zero vectors made by all three of them: a half is the min-max zero sequence.
+/// `all_on` of the zero vectors made by all three of them: a share of one half is the min-max zero sequence.
 fn on_shares(voltage: AlphaBeta, all_on: f32) -> Abc {
     let phase = voltage.abc();
     let high = max(phase.a, max(phase.b, phase.c));
@@ -81,10 +81,10 @@ fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The on-time in ticks. A pulse spans two halves, so a half may hold half the shortest pulse; what is shorter is
+/// The on-time in ticks. A pulse spans two halves, so a half may hold half the shortest pulse; a shorter one is
 /// left out or filled up, whichever is nearer.
 fn whole_pulse(share: f32, period_ticks: u32, min_pulse_ticks: u32) -> u32 {
-    // What is below 0, or no number, the conversion makes 0.
+    // The conversion makes 0 of what is below 0 or NaN.
     let on = ((share * period_ticks as f32 + 0.5) as u32).min(period_ticks);
     let pause = period_ticks - on;
     let shortest = min_pulse_ticks.div_ceil(2);
@@ -118,7 +118,7 @@ mod tests {
                     continue;
                 }
                 assert!(got == 0 || got == period || is_whole, "{:?}", told());
-                // To the nearer one of what there may be.
+                // To the nearer one of the allowed values.
                 assert!(got == on || on < shortest || period - on < shortest, "{:?}", told());
                 assert!(got.abs_diff(on) <= shortest.div_ceil(2), "{:?}", told());
             }

@@ -1,31 +1,31 @@
 //! Dead-time compensation.
 //!
-//! While both devices of a leg are off, its current chooses the level: out of the leg (positive) it flows through the lower
-//! diode, into the leg through the upper one. So a rising edge comes late by the dead time when the current is positive, a
-//! falling one when it is negative, and the other edges come at once. Those that would come late are commanded earlier.
+//! While both devices of a leg are off, the leg's current chooses the level: out of the leg (positive) it flows through the lower diode, into the leg through
+//! the upper one. So a rising edge is late by the dead time when the current is positive, a falling one when it is negative; the other edges come at once.
+//! Edges that would be late are commanded earlier.
 //!
-//! The thresholds of IGBT and diode take voltage in the same direction, all the time. As an edge in each carrier is delayed by the current, what they take of a
-//! carrier's volt-seconds is made up for by that edge, too.
+//! The thresholds of IGBT and diode take voltage in the same direction all the time. Since the current delays one edge in each carrier, that edge also makes
+//! up for the volt-seconds that the thresholds take in the carrier.
 
 use super::CarrierHalf;
 use crate::frames::Abc;
 
-/// By how much a current delays an edge.
+/// Delay of an edge by a current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeDelay {
-    /// Whatever the current is, in ticks: the dead time, and the devices' thresholds.
+    /// The part that does not depend on the current, in ticks: the dead time, and the devices' thresholds.
     pub ticks: f32,
-    /// For each ampere of it, in ticks: the slope of the devices.
+    /// The part for each ampere, in ticks: the slope of the devices.
     pub ticks_per_a: f32,
 }
 
 impl EdgeDelay {
-    /// Of a dead time alone.
+    /// The delay of a dead time alone.
     pub const fn of_dead_time(ticks: u32) -> Self {
         Self { ticks: ticks as f32, ticks_per_a: 0.0 }
     }
 
-    /// With devices, too, that take these shares of the link's voltage whatever current flows, and for each ampere, in carrier halves of this length.
+    /// Adds devices that take these shares of the link's voltage, at any current and for each ampere, in carrier halves of this length.
     pub const fn with_drops(self, threshold_share: f32, share_per_a: f32, period_ticks: u32) -> Self {
         let carrier = 2.0 * period_ticks as f32;
         Self {
@@ -35,8 +35,8 @@ impl EdgeDelay {
     }
 }
 
-/// Moves the edges of a half so that the legs do what it says when the timer plays it; `currents_a` are the phase currents that are
-/// expected in it. Currents below `small_a` may have either sign by their ripple: they count in proportion. Edges at the half's
+/// Moves the edges of a half so that the legs do as it says when the timer plays it; `currents_a` are the phase currents
+/// expected in it. Currents below `small_a` may have either sign because of their ripple: they count in proportion. Edges at the half's
 /// very start belong to the half before and cannot come earlier.
 ///
 /// ```
@@ -53,7 +53,7 @@ pub fn compensate(half: &mut CarrierHalf, currents_a: &Abc, small_a: f32, delay:
     for ((compare, start_level), current) in phases.zip([currents_a.a, currents_a.b, currents_a.c]) {
         let against = if start_level { -current } else { current };
         if *compare < half.period_ticks {
-            // What is below 0 the conversion makes 0.
+            // The conversion makes 0 of what is below 0.
             let share = if against > small_a { 1.0 } else { against / small_a };
             let late = (delay.ticks + delay.ticks_per_a * against) * share;
             *compare = compare.saturating_sub((late + 0.5) as u32);

@@ -1,34 +1,34 @@
 //! The flying start of a pattern: it begins on a turning machine whose gates were off.
 //!
-//! The flux in the machine is that of the magnets. A pattern that began at once would leave its hexagon off the centre by what is missing,
-//! and the machine with a current that decays slowly. So the first half is a carrier's, as long as it takes to lead the
-//! flux to the hexagon, to the corner or the middle of an edge where it will be at that time by the pattern's angle. Where the diodes conduct all the time
+//! The flux in the machine is that of the magnets. A pattern that began at once would leave its hexagon off the centre by the missing flux,
+//! and the machine with a slowly decaying current. So the first half is a carrier's, as long as it takes to lead the
+//! flux to the hexagon: to the corner or the middle of an edge where it will be at that time by the pattern's angle. If the diodes conduct all the time
 //! they have led it there already.
 
 use super::half::boundary;
 use super::{Mode, Reference, RippleFlux};
 use crate::frames::{AlphaBeta, Angle, SQRT_3, UNITS_PER_RADIAN};
 
-/// The voltage that a carrier gives in every direction, as a share of the link's.
+/// The voltage that a carrier can give in every direction, as a share of the link's.
 const LARGEST_SHARE: f32 = 1.0 / SQRT_3;
 
-/// Least angle of the first half, 15°: as short as a half gets that catches up with its angle.
+/// Least angle of the first half, 15°: the shortest of a half that catches up with its angle.
 const LEAST: Angle = Angle(178_956_971);
 
-/// Ends of the first half are considered up to here, 135°, one after the other.
+/// Angle up to which ends of the first half are considered, one after the other: 135°.
 const FARTHEST: Angle = Angle(0x6000_0000);
 
-/// EMF from which on the diodes conduct all the time, as a share of the link's voltage: their own voltage is that of six-step, 2/π, less what sensors may be off.
-/// Below it a map that knows of too strong magnets would have diodes lead a flux linkage that is not there: two of 10,000 random runs tripped.
+/// EMF from which the diodes conduct all the time, as a share of the link's voltage: their own voltage is that of six-step, 2/π, less the possible error of
+/// sensors. Below it, a map with too strong magnets would have the diodes lead a flux linkage that is not there: two of 10,000 random runs tripped.
 const CONDUCTING: f32 = 0.62;
 
-/// Distance of an EMF from the pattern's fundamental within which the diodes lead, as a share of the link's voltage. In steady state they leave up to 0.24, as
-/// much as the operating point differs from theirs; 0.57 and more are currents that another command has left.
+/// Distance of an EMF from the pattern's fundamental within which the diodes lead, as a share of the link's voltage. In steady state they leave up to 0.24, the
+/// difference of the operating point from theirs; 0.57 and more are currents that another command has left.
 const LED_WITHIN: f32 = 0.4;
 
-/// `true` of an EMF, as a share of the link's voltage, that drives current through the diodes in steady state.
+/// `true` for an EMF, as a share of the link's voltage, that drives current through the diodes in steady state.
 ///
-/// The diodes switch as square wave does, at its angle, so a pattern begins where they are. No carrier can lead as much flux as that:
+/// The diodes switch as square wave does, at its angle, so a pattern begins where they are. No carrier can lead so much flux:
 /// with a first half that tried to, up to 135° long, machines whose magnets have that EMF took 2 to 8 times their largest current.
 pub fn diodes_lead(emf: AlphaBeta, pulse: Angle, seen: &Reference) -> bool {
     let round = (pulse - Angle::DEG_90).sin_cos();
@@ -41,14 +41,14 @@ pub fn diodes_lead(emf: AlphaBeta, pulse: Angle, seen: &Reference) -> bool {
 pub struct FlyingStart {
     /// Its number in the pattern, for its end.
     pub half: u32,
-    /// By how much the pulse angle turns meanwhile.
+    /// Turn of the pulse angle meanwhile.
     pub turned: Angle,
     /// Its mean voltage, stationary frame, as a share of the link's.
     pub share: AlphaBeta,
 }
 
 impl FlyingStart {
-    /// Begun at pulse angle `pulse` with an EMF as a share of the link's voltage. It ends at the first boundary which the voltage of a
+    /// The first half for a start at pulse angle `pulse` with an EMF as a share of the link's voltage. It ends at the first boundary that the voltage of a
     /// carrier can reach.
     pub fn new(mode: Mode, pulse: Angle, emf: AlphaBeta, seen: &Reference) -> Self {
         // Flux times frequency is a voltage, here as a share of the link's.
@@ -56,7 +56,7 @@ impl FlyingStart {
         let present = AlphaBeta { alpha: emf.beta, beta: -emf.alpha };
         let turn = 2 * mode.carriers();
         let mut end = ((u64::from((pulse + LEAST).0) * u64::from(turn)) >> 32) as u32 + 1;
-        // Each end is 10° farther at least, so the farthest comes within 14.
+        // Each end is at least 10° farther, so the farthest comes within 14.
         loop {
             if end >= turn {
                 end -= turn;

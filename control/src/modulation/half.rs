@@ -44,12 +44,12 @@ impl CarrierHalf {
         }
     }
 
-    /// `true` for a half of the free carrier that two more follow: its length depends on nothing.
+    /// `true` for a half of the free carrier that is followed by two more: its length depends on nothing.
     pub fn is_free(&self) -> bool {
         (self.mode, self.ahead) == (Mode::Async, [Mode::Async; 2])
     }
 
-    /// For how many ticks each phase is at the upper level, from `from` ticks after the start to the end.
+    /// Number of ticks for which each phase is at the upper level, from `from` ticks after the start to the end.
     pub fn on_ticks(&self, from: u32) -> [u32; 3] {
         let (mut on, end) = ([0; 3], self.period_ticks);
         let from = from.min(end);

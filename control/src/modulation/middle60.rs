@@ -1,8 +1,8 @@
 //! Middle-60° modulation and the square wave.
 //!
-//! In each sector of 60° of the pulse angle one phase alone may switch, the one in the middle of its half wave
-//! (order b, a, c, b, a, c from 0°). Each carrier holds one notch of that phase in its middle, of width β; while
-//! it lasts all three phases are at one level and the voltage is zero. A notch spans both halves of its carrier,
+//! In each sector of 60° of the pulse angle only one phase may switch, the one in the middle of its half wave
+//! (order b, a, c, b, a, c from 0°). Each carrier holds one notch of that phase in its middle, of width β; during
+//! the notch all three phases are at one level and the voltage is zero. A notch spans both halves of its carrier,
 //! and each half sets its own part anew.
 
 use super::{CarrierHalf, Mode, Reference, SwitchLimits};
@@ -18,7 +18,7 @@ pub fn half_notch_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
     asin_up_to_30_degrees(limit((1.0 - modulation_index) / mode.row().notch_sum, 0.0, 0.5))
 }
 
-/// Half the zero voltage of a sector, as an angle in rad. A mode that gives all that the link has (square wave) has some only where less
+/// Half the zero voltage of a sector, as an angle in rad. A mode that gives all that the link has (square wave) has some only if less
 /// voltage is asked for, after a jump of the link.
 #[inline(never)]
 pub fn zero_rad(mode: Mode, voltage_v: f32, udc_v: f32) -> f32 {
@@ -60,7 +60,7 @@ fn sector_levels(sector: u32) -> ([bool; 3], usize) {
     }
 }
 
-/// A half of a pattern's carrier, `period_ticks` long, of which the last part or, in the second half, the first is a notch of
+/// A half of a pattern's carrier, `period_ticks` long. Its last part or, in the second half, its first part is a notch of
 /// `notch_ticks`. No notch at all makes square wave.
 pub fn half(
     mode: Mode,
@@ -107,7 +107,7 @@ mod tests {
         }
     }
 
-    /// Every notch of every half up to 120 ticks, with every shortest pulse up to 130, and what is no length.
+    /// Every notch of every half up to 120 ticks, with every shortest pulse up to 130, and values that are no length.
     #[test]
     fn a_notch_and_what_is_beside_it_are_no_shorter_than_half_the_shortest_pulse() {
         for (period, min_pulse) in

@@ -1,16 +1,16 @@
 //! The pulses: the modulator of a two-level inverter.
 //!
 //! Every mode is one carrier with one compare value a phase. Once for each carrier half the modulator
-//! describes it, as a timer's shadow registers take it: its length, each phase's level at
+//! describes the half in the form that a timer's shadow registers take: its length, each phase's level at
 //! its start, and the instant at which that level toggles. In the synchronous modes the halves are locked to
-//! the pulse angle (voltage angle + 90°: phase a's reference is the sine of it): the length of each half takes the
+//! the pulse angle (voltage angle + 90°: phase a's reference is the sine of it). The length of each half takes the
 //! carrier to its next boundary angle, so phase errors vanish within a half and nothing accumulates.
 //!
-//! Backward rotation is forward rotation seen in a mirror: the angle changes sign, phases b and c change places.
+//! Backward rotation is forward rotation seen in a mirror: the angle changes sign, and phases b and c are exchanged.
 //!
 //! # Examples
-//! A [`Schedule`] chooses the mode by frequency and voltage, or holds one, as here. The asynchronous carrier: each half has the mean
-//! voltage that is asked for.
+//! A [`Schedule`] chooses the mode by frequency and voltage, or holds one, as here. The asynchronous carrier: each half has the requested
+//! mean voltage.
 //!
 //! ```
 //! use tractive_control::frames::Angle;
@@ -28,7 +28,7 @@
 //! assert!(half.period_ticks >= 25_000_000 / 1_800, "half a period of 900 Hz at least");
 //! ```
 //!
-//! A locked carrier: fifteen of them last one turn of the voltage, 20 ms at 50 Hz.
+//! A locked carrier: fifteen carriers last one turn of the voltage, 20 ms at 50 Hz.
 //!
 //! ```
 //! # use tractive_control::frames::Angle;
@@ -67,7 +67,7 @@
 //! assert!((notch * 30.0 - 2.87).abs() < 0.05, "of a half of 30°");
 //! ```
 //!
-//! Square wave: no edge within a half, and in a turn each phase is on for half of it.
+//! Square wave: no edge within a half; in a turn each phase is on for half of the time.
 //!
 //! ```
 //! # use tractive_control::frames::Angle;

@@ -1,7 +1,7 @@
 //! The modes: one row of a table each.
 //!
-//! A new pattern is a new row at the table's end and its tests. Whatever asks about modes (modulator, schedule, control, wire,
-//! traces, reports and command line) reads the rows; whoever wants the drive to use it names it in a [`Ladder`](super::Ladder).
+//! A new pattern is a new row at the table's end, and its tests. Everything that asks about modes (modulator, schedule, control, wire,
+//! traces, reports and command line) reads the rows; for the drive to use the pattern, name it in a [`Ladder`](super::Ladder).
 
 #[cfg(feature = "optimal")]
 use super::optimal::{self, Branch};
@@ -10,7 +10,7 @@ use super::schedule::Border;
 /// The maker of a mode's pulses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// Nothing: all gates off.
+    /// No pulses: all gates off.
     Rest,
     /// A triangular carrier: the mean voltage of each of its halves follows the command.
     Carrier,
@@ -29,14 +29,14 @@ pub enum Regulation {
     Mean,
     /// Amplitude and angle of the fundamental, by the notches' width and the boundaries' instants.
     Fundamental,
-    /// The angle alone: the amplitude is all that the link gives.
+    /// The angle alone: the amplitude is whatever the link gives.
     Angle,
     /// The flux along the pattern's own path, by moving its next edges.
     #[cfg(feature = "optimal")]
     Path,
 }
 
-/// A mode's flux ripple as a share of the fundamental flux, over the share of six-step that its fundamental lacks.
+/// A mode's flux ripple as a share of the fundamental flux, by the share of six-step that its fundamental lacks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RippleShare {
     /// At six-step.
@@ -88,13 +88,13 @@ impl Row {
         branch: None,
     };
 
-    /// A triangular carrier with min-max zero sequence, whose fundamental ends at udc/√3; so many carriers a turn, 0 for a free
+    /// A triangular carrier with min-max zero sequence, whose fundamental ends at udc/√3, with so many carriers a turn, 0 for a free
     /// one. Its ripple counts as that of 12.
     const fn carrier(name: &'static str, carriers: u8, until: Border) -> Self {
         Self { name, kind: Kind::Carrier, carriers, turn_ons: carriers, until, ..Self::REST }
     }
 
-    /// Middle 60° with so many notches a sector, each in the middle of its carrier, and so long a carrier half that it is a multiple
+    /// Middle 60° with so many notches a sector, each in the middle of its carrier; the length of a carrier half must be a multiple
     /// of 5°.
     const fn middle60(
         name: &'static str,
@@ -138,8 +138,8 @@ impl Row {
     }
 }
 
-/// The modes and their rows from one list. A mode's place in it is its code on every wire: rows are added at the end. Those behind
-/// `optimal` are there with that feature only, in the ladder's order.
+/// The modes and their rows, from one list. A mode's place in it is its code on every wire: rows are added at the end. Those behind
+/// `optimal` exist with that feature only, in the ladder's order.
 macro_rules! modes {
     (
         $($(#[$about:meta])* $mode:ident: $row:expr;)*
@@ -163,7 +163,7 @@ macro_rules! modes {
             /// Every mode, in the order of their codes.
             pub const ALL: [Self; [$(Self::$mode,)* $(Self::$optimal),*].len()] = [$(Self::$mode,)* $(Self::$optimal),*];
 
-            /// The optimised patterns, from many pulses to few, and each number's from a small modulation index to a large one.
+            /// The optimised patterns, from many pulses to few, and for each number of pulses from a small modulation index to a large one.
             pub(super) const OPTIMAL: [Self; [$(Self::$optimal),*].len()] = [$(Self::$optimal),*];
         }
 
@@ -174,9 +174,9 @@ macro_rules! modes {
     };
 }
 
-// The frequencies of borders lie a little below what devices of 900 Hz allow (60, 75, 128.6, 180, 300 Hz), so that waiting for a legal
+// The borders' frequencies lie a little below what devices of 900 Hz allow (60, 75, 128.6, 180, 300 Hz), so that waiting for a legal
 // angle on the steepest ramp stays within it. The modulation index alone does not end the asynchronous mode: at a low frequency a pattern of few
-// pulses would leave more ripple than the tenth of voltage is worth that it adds.
+// pulses would leave more ripple than its additional tenth of voltage is worth.
 modes! {
     /// All gates off.
     #[default]
@@ -191,7 +191,7 @@ modes! {
     Mid7: Row::middle60("mid7", 3, 5.758_77, [0.0, 0.079], Border::new((126.0, 121.0), (0.913, 0.885)));
     /// Middle 60°, 3 pulses: 6 carriers per turn with one notch each; 2 of equation (15).
     Mid3: Row::middle60("mid3", 1, 2.0, [0.01, 0.408], Border::new((297.0, 290.0), (0.990, 0.978)));
-    /// Square wave: 6 carriers per turn without a notch, or with one where a link has jumped and less voltage is asked for.
+    /// Square wave: 6 carriers per turn without a notch, or with one if a link has jumped and less voltage is asked for.
     Square: Row {
         regulation: Regulation::Angle,
         turn_ons: 1,
@@ -261,7 +261,7 @@ impl Mode {
         self.row().name
     }
 
-    /// The name of all branches of the same number of pulses: `opp7` of `opp7a` to `opp7e`; of any other mode its own.
+    /// The common name of all branches with the same number of pulses: `opp7` of `opp7a` to `opp7e`; for any other mode its own.
     pub fn family(self) -> &'static str {
         if self.is_optimal() {
             self.name().trim_end_matches(|letter: char| letter.is_ascii_lowercase())
@@ -270,7 +270,7 @@ impl Mode {
         }
     }
 
-    /// The mode with this name or, where it is that of a family, the branch that the drive plays at a modulation index on the way up;
+    /// The mode with this name or, if it is a family's name, the branch that the drive plays at a modulation index on the way up;
     /// `None` for any other text.
     pub fn named_at(name: &str, index: f32) -> Option<Self> {
         let mut branches = Self::ALL.into_iter().filter(|mode| mode.family() == name);
@@ -279,13 +279,13 @@ impl Mode {
         })
     }
 
-    /// Carriers per turn of the pulse angle; 0 where the carrier is not locked to it.
+    /// Carriers per turn of the pulse angle; 0 if the carrier is not locked to it.
     #[inline]
     pub const fn carriers(self) -> u32 {
         self.row().carriers as u32
     }
 
-    /// Turn-ons of a device per turn of the pulse angle; 0 where the carrier is not locked to it.
+    /// Turn-ons of a device per turn of the pulse angle; 0 if the carrier is not locked to it.
     pub const fn turn_ons(self) -> u32 {
         self.row().turn_ons as u32
     }
@@ -334,7 +334,7 @@ impl Mode {
         self.carriers() / 6
     }
 
-    /// `true` for a mode whose flux stands off its fundamental at the boundaries: all patterns.
+    /// `true` for a mode whose flux differs from its fundamental at the boundaries: all patterns.
     #[inline(always)]
     pub const fn has_path(self) -> bool {
         self.is_pattern() || self.is_optimal()
@@ -360,7 +360,7 @@ mod tests {
         }
     }
 
-    /// At the index at which a branch gives way on the way up the next one is played.
+    /// At the index at which a branch gives way on the way up, the next one is played.
     #[cfg(feature = "optimal")]
     #[test]
     fn at_its_border_a_branch_has_given_way() {

@@ -23,11 +23,11 @@ pub struct Modulator {
     next_half: u32,
     mirrored: bool,
     plan: Option<Plan>,
-    /// By how many ticks the half before ended behind its boundary, where a pattern gives way to another there; 0 otherwise.
+    /// Ticks by which the half before ended after its boundary, if a pattern gives way to another there; 0 otherwise.
     late_ticks: f32,
-    /// Fundamental of the pattern's half before, in V.
+    /// Fundamental of the pattern's previous half, in V.
     voltage_v: f32,
-    /// The pattern that the half before was the last of, and the number that its next one would have had; a carrier follows.
+    /// The pattern that ended with the half before, and the number that its next half would have had; a carrier follows.
     left: Option<(Mode, u8)>,
     /// Carriers for which an optimised pattern has waited to take over from a free one.
     #[cfg(feature = "optimal")]
@@ -48,17 +48,17 @@ struct Plan {
     at: u32,
 }
 
-/// The largest distance of a carrier from its angle when it gives way to a pattern: 6°, less than half of its shortest half.
+/// The largest distance of a carrier from its angle at which it gives way to a pattern: 6°, less than half of its shortest half.
 const KEPT_ANGLE: Angle = Angle(71_582_788);
 
 /// Carriers for which an optimised pattern waits for an angle at which it should take over from a free one.
 #[cfg(feature = "optimal")]
 const LONGEST_WAIT: u32 = 100;
 
-/// Halves by which a switch between locked modes is announced.
+/// Halves by which a switch between locked modes is announced beforehand.
 const AHEAD: u32 = 2;
 
-/// Shortest and longest half, as shares of the nominal one, while it catches up with its angle; of a free carrier, where it ends at an optimised pattern's.
+/// Shortest and longest half, as shares of the nominal one, while it catches up with its angle, or for a free carrier with an optimised pattern's angle.
 /// A triangular carrier's voltage has the right angle wherever its carrier stands, so it need not be longer, and its ripple stays
 /// small; a pattern's angle is that of its boundaries.
 const CARRIER_STRETCH: (f32, f32) = (0.8, 1.05);
@@ -89,7 +89,7 @@ impl Modulator {
         self.mirrored
     }
 
-    /// The half carrier that begins at `start`; `None` as reference: all gates off. Inlined: the stack of a call is not needed twice.
+    /// The half carrier that begins at `start`; `None` as reference: all gates off. Inlined, so that the stack of a call is not needed twice.
     #[inline(always)]
     pub fn step(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierHalf {
         let Some(reference) = reference else {
@@ -134,7 +134,7 @@ impl Modulator {
         revised
     }
 
-    /// All gates off; where a reference is known, with the mode that it would begin with announced.
+    /// All gates off; if a reference is known, the mode that it would begin with is announced.
     #[inline(never)]
     pub fn rest(&mut self, start: Instant, reference: Option<&Reference>) -> CarrierHalf {
         self.mode = Mode::Off;
@@ -148,7 +148,7 @@ impl Modulator {
         half
     }
 
-    /// The mirror follows the sign of rotation, but only where the carrier is not locked to the angle.
+    /// Lets the mirror follow the sign of rotation, but only while the carrier is not locked to the angle.
     fn turn_mirror(&mut self, rate: f32) {
         if matches!(self.mode, Mode::Off | Mode::Async) {
             self.mirrored = rate < 0.0;
@@ -159,7 +159,7 @@ impl Modulator {
     /// ahead, so that control can lead the flux to where the new pattern begins.
     fn choose_mode(&mut self, start: Instant, pulse: Angle, seen: &Reference) {
         if let Some(plan) = self.plan {
-            // A step of torque may have come since.
+            // A torque step may have come since.
             if self.mode.is_carrier() && !self.may_begin(plan.to, pulse) {
                 self.plan = None;
             } else if plan.at == self.next_half {
@@ -185,8 +185,8 @@ impl Modulator {
         }
     }
 
-    /// The plan by which an optimised pattern takes over from a free carrier: where its flux lies next to the fundamental, and the next two halves can end.
-    /// It does not wait for ever: at some speeds none of a hundred carriers comes so near.
+    /// The plan by which an optimised pattern takes over from a free carrier: at a place where its flux lies next to the fundamental and the next two halves
+    /// can end. The wait is limited: at some speeds none of a hundred carriers comes so near.
     #[cfg(feature = "optimal")]
     fn calm_plan(&mut self, to: Mode, pulse: Angle, rate: f32) -> Option<Plan> {
         let branch = to.branch()?;
@@ -207,8 +207,8 @@ impl Modulator {
         None
     }
 
-    /// `true` if the locked half that begins at pulse angle `pulse` begins where it should, or a carrier is to follow. After a step of torque a
-    /// carrier catches up with its angle over many halves; a pattern that began then would have its pulses in the wrong place.
+    /// `true` if the locked half that begins at pulse angle `pulse` begins where it should, or a carrier is to follow. After a torque step a
+    /// carrier catches up with its angle over many halves; a pattern that began meanwhile would have its pulses in the wrong place.
     fn may_begin(&self, wanted: Mode, pulse: Angle) -> bool {
         let off = boundary(self.next_half, self.mode.carriers()) - pulse;
         self.mode == Mode::Async || wanted.is_carrier() || off.signed().unsigned_abs() < KEPT_ANGLE.0
@@ -238,7 +238,7 @@ impl Modulator {
         self.mode == Mode::Async && to.is_optimal()
     }
 
-    /// The number, in the mode `to`, of the half with which it takes over where this one's half `next_half` would begin.
+    /// The number, in the mode `to`, of the half with which that mode takes over at the place where this one's half `next_half` would begin.
     fn first(&self, to: Mode, next_half: u32, pulse: Angle) -> u32 {
         #[cfg(feature = "optimal")]
         if self.joins_free(to) {
@@ -247,7 +247,7 @@ impl Modulator {
         first_half(self.mode, to, next_half, pulse)
     }
 
-    /// The number of the next half by which control knows it: a free carrier's last ones count to the pattern's first.
+    /// The number by which control knows the next half: a free carrier's last halves are numbered up to the pattern's first one.
     fn number(&self) -> u32 {
         #[cfg(feature = "optimal")]
         if let Some(plan) = self.plan.filter(|plan| self.joins_free(plan.to)) {
@@ -262,7 +262,7 @@ impl Modulator {
         if sum >= turn { sum - turn } else { sum }
     }
 
-    /// Halves after which the numbering begins anew: a turn of a locked carrier, a period of a free one.
+    /// Number of halves after which the numbering starts anew: a turn of a locked carrier, a period of a free one.
     const fn halves(&self) -> u32 {
         match self.mode.carriers() {
             0 => 2,
@@ -279,8 +279,8 @@ impl Modulator {
         }
     }
 
-    /// The first half of a pattern after none: one of a carrier, which leads the machine's flux to where the pattern begins. Where the diodes
-    /// conduct there is none, and the pattern goes on from the half that begins nearest: they lead the flux as it would.
+    /// The first half of a pattern that follows no pulses: a carrier's, which leads the machine's flux to where the pattern begins. If the diodes
+    /// conduct there is none, and the pattern continues from the half that begins nearest: the diodes lead the flux as it would.
     #[cold]
     #[inline(never)]
     fn start_flying(&mut self, start: Instant, pulse: Angle, seen: &Reference) -> Option<CarrierHalf> {
@@ -309,7 +309,7 @@ impl Modulator {
         carrier::asynchronous(self.next_half, (start, period_ticks), seen, led, &self.devices)
     }
 
-    /// One half of a carrier that is locked to the pulse angle.
+    /// One half of a carrier locked to the pulse angle.
     fn locked(&mut self, start: Instant, pulse: Angle, seen: &Reference, led: AlphaBeta) -> CarrierHalf {
         let carriers = self.mode.carriers();
         let end = boundary(self.next_half + 1, carriers);
@@ -333,7 +333,7 @@ impl Modulator {
         let late_ticks = core::mem::take(&mut self.late_ticks);
         let due = wanted + late_ticks;
         let mut notch = due * (own_rad * ZERO_OF_HALF);
-        // Where hexagons meet an edge has the length that it should have, and whatever time is left is zero voltage.
+        // Where hexagons meet, an edge has its proper length, and the remaining time is zero voltage.
         let beside_edge = |zero_rad: f32| due - nominal * (1.0 - zero_rad * ZERO_OF_HALF);
         if let Some(next) = self.gives_way_to().map(|plan| plan.to).filter(|next| next.is_pattern()) {
             let old_rad = middle60::zero_rad(self.mode, self.voltage_v, seen.udc_v);
@@ -349,8 +349,8 @@ impl Modulator {
         middle60::half(self.mode, self.next_half, period_ticks, notched.then_some(notch), &self.devices)
     }
 
-    /// The volt-ticks, over the link's voltage, by which the next half leads the flux from where an old pattern has left it, and to where a pattern
-    /// that follows begins; a carrier's flux is the fundamental itself at its boundaries, and a pattern of middle 60° leads nothing.
+    /// The volt-ticks, over the link's voltage, by which the next half leads the flux from where an old pattern has left it and to where the following
+    /// pattern begins. A carrier's flux is the fundamental itself at its boundaries; a pattern of middle 60° leads nothing.
     #[inline(always)]
     fn led(&self, seen: &Reference) -> AlphaBeta {
         let next = self.gives_way_to();
@@ -372,7 +372,7 @@ impl Modulator {
         self.plan.filter(|plan| plan.at == self.half_after(self.next_half, 1))
     }
 
-    /// One half of an optimised pattern, its edges moved by what the wanted mean voltage differs from the pattern's fundamental.
+    /// One half of an optimised pattern, its edges moved by the difference of the wanted mean voltage from the pattern's fundamental.
     #[cfg(feature = "optimal")]
     #[inline(never)]
     fn optimal(
@@ -395,7 +395,7 @@ impl Modulator {
         }
     }
 
-    /// A length in whole ticks. Slower than the async mode's range there is nothing to lock to: the length stays that
+    /// A length in whole ticks. Below the async mode's range there is nothing to lock to: the length stays that
     /// of a stopped carrier.
     #[inline(never)]
     fn whole_ticks(&self, period: f32) -> u32 {

@@ -11,7 +11,7 @@ pub struct Reference {
     pub voltage_v: f32,
     /// The same as a vector at `at`, in V.
     pub vector: AlphaBeta,
-    /// Angle of the vector to which a locked carrier keeps, at `at`: without what regulation adds for one half only.
+    /// Angle, at `at`, of the vector that a locked carrier keeps to: without the part that regulation adds for one half only.
     pub carrier_angle: Angle,
     /// Angle units (2⁻³² turn) per tick by which it turns; negative backward.
     pub rate: f32,
@@ -24,7 +24,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// No voltage, on a link of none.
+    /// No voltage, on a link without voltage.
     pub const NONE: Self = Self {
         voltage_v: 0.0,
         vector: AlphaBeta { alpha: 0.0, beta: 0.0 },
@@ -43,12 +43,12 @@ impl Reference {
         Self { voltage_v, vector, carrier_angle: angle, rate, at, udc_v, modulation_index }
     }
 
-    /// The vector at an instant, in V, turned on at constant rate.
+    /// The vector at an instant, in V, turned at constant rate.
     pub fn vector_at(&self, instant: Instant) -> AlphaBeta {
         self.vector.turned(self.turned(instant).sin_cos())
     }
 
-    /// The vector in the middle of a half, as a share of the link's voltage: there the mean of a turning vector stands.
+    /// The vector in the middle of a half, as a share of the link's voltage: a turning vector has its mean there.
     #[inline(never)]
     pub(super) fn share_within(&self, start: Instant, period_ticks: u32) -> AlphaBeta {
         self.vector_at(start.after(period_ticks / 2)) * (1.0 / self.udc_v)

@@ -1,7 +1,7 @@
 //! The ripple flux that each pulse pattern leaves at its carrier boundaries: pure functions of (mode, u, θ).
 //!
-//! In steady state the flux of a symmetric pattern runs along a hexagon; at a boundary it stands off its fundamental
-//! by an amount that is known beforehand. Control subtracts it, so that samples at boundaries tell the fundamental.
+//! In steady state the flux of a symmetric pattern runs along a hexagon; at a boundary it differs from its fundamental
+//! by a known amount. Control subtracts it, so that samples at boundaries show the fundamental.
 
 use super::{Mode, middle60};
 use crate::frames::{AlphaBeta, SinCos};
@@ -20,7 +20,7 @@ pub struct RippleFlux {
 }
 
 impl RippleFlux {
-    /// Of a pattern with a fundamental of `voltage_v` (peak phase) at a stator frequency of `omega` (rad/s, greater than zero).
+    /// The ripple of a pattern with a fundamental of `voltage_v` (peak phase) at a stator frequency of `omega` (rad/s, greater than zero).
     /// `None` for the triangular carriers: at their peaks and valleys the flux is that of the sampled fundamental.
     #[inline]
     pub fn new(mode: Mode, voltage_v: f32, udc_v: f32, omega: f32) -> Option<Self> {
@@ -35,10 +35,10 @@ impl RippleFlux {
         Some(Self { sector_halves, half_places, edge_wb, fundamental_wb: voltage_v * per_omega })
     }
 
-    /// At the boundary where half number `half` begins, in Wb, in the stationary frame of the (mirrored) turn.
+    /// The ripple at the boundary where half number `half` begins, in Wb, in the stationary frame of the (mirrored) turn.
     ///
-    /// At half i of N the flux stands at `D (1 + (i/N)(e^{j60°} − 1))`, turned by the sector, with the edge D; from that the
-    /// fundamental at `i/N · 60°` is taken away. The flux lags the voltage by 90°, and that the pulse angle by 90°.
+    /// At half i of N the flux is at `D (1 + (i/N)(e^{j60°} − 1))`, turned by the sector, with the edge D; the
+    /// fundamental at `i/N · 60°` is subtracted from it. The flux lags the voltage by 90°, and the voltage lags the pulse angle by 90°.
     pub fn at(&self, half: u32) -> AlphaBeta {
         let Some((start, place)) = self.place(half) else {
             return AlphaBeta::default();
@@ -50,7 +50,7 @@ impl RippleFlux {
         (round * self.fundamental_wb - self.along_edge(place)).turned(*start)
     }
 
-    /// The flux itself where half number `half` begins, which is that of the hexagon, in Wb, in the stationary frame of the (mirrored)
+    /// The flux itself, which is that of the hexagon, at the beginning of half number `half`, in Wb, in the stationary frame of the (mirrored)
     /// turn.
     pub fn hexagon(&self, half: u32) -> AlphaBeta {
         match self.place(half) {
@@ -82,7 +82,7 @@ static SECTORS: [SinCos; 6] = directions(6);
 /// The places of 5° in a sector, where a boundary may lie.
 static PLACES: [SinCos; 12] = directions(72);
 
-/// The first directions of so many that are evenly spread over the turn.
+/// The first of so many directions that are evenly spread over the turn.
 const fn directions<const N: usize>(count: u32) -> [SinCos; N] {
     let mut directions = [SinCos { sin: 0.0, cos: 1.0 }; N];
     let mut k = 0;
@@ -93,8 +93,8 @@ const fn directions<const N: usize>(count: u32) -> [SinCos; N] {
     directions
 }
 
-/// The ripple flux of any mode where half number `half` begins, in Wb, in the stationary frame of the (mirrored) turn, for a fundamental of
-/// `voltage_v` (peak phase) at a stator frequency of `omega` (rad/s, greater than zero): nothing under a carrier.
+/// The ripple flux of any mode at the beginning of half number `half`, in Wb, in the stationary frame of the (mirrored) turn, for a fundamental of
+/// `voltage_v` (peak phase) at a stator frequency of `omega` (rad/s, greater than zero): zero under a carrier.
 #[inline(never)]
 pub fn ripple_at(mode: Mode, half: u32, voltage_v: f32, udc_v: f32, omega: f32) -> AlphaBeta {
     #[cfg(feature = "optimal")]
@@ -105,7 +105,7 @@ pub fn ripple_at(mode: Mode, half: u32, voltage_v: f32, udc_v: f32, omega: f32) 
 }
 
 /// The flux ripple of a mode as a share of the fundamental flux (its weighted distortion), for a fundamental of `modulation_index` of
-/// six-step: within 6 % of what a pattern's pulses have, 12 % of an optimised one's. The carriers count as one, that of 12
+/// six-step: within 6 % of that of a pattern's pulses, 12 % of an optimised one's. All carriers count as one, that of 12
 /// carriers a turn.
 #[inline(always)]
 pub fn ripple_share(mode: Mode, modulation_index: f32) -> f32 {
@@ -116,15 +116,15 @@ pub fn ripple_share(mode: Mode, modulation_index: f32) -> f32 {
     share.least + share.linear * missing + share.square * missing * missing
 }
 
-/// Least stator frequency of a locked pattern, in rad/s: none is made so slowly but by a rotor that has just stopped.
+/// Least stator frequency of a locked pattern, in rad/s: only for a rotor that has just stopped is one made so slowly.
 const SLOWEST: f32 = 1.0;
 
 /// Mean squares of a mode's flux ripple along the flux linkage and across it, over the square of the link's voltage, in s², for a fundamental of
 /// `modulation_index` of six-step at a stator frequency of `omega` (rad/s; a free carrier's halves last `free_half_s` at any).
 ///
-/// Of a carrier with min-max zero sequence they are polynomials of `m`, the amplitude over half of the link, times (udc T)² with the half's length T:
-/// the volt-seconds of the half's three edges, squared and averaged over the half and the turn. A pattern's zero vectors make ripple across, its
-/// hexagon along the flux linkage.
+/// For a carrier with min-max zero sequence they are polynomials of `m`, the amplitude over half of the link, times (udc T)² with the half's length T:
+/// the volt-seconds of the half's three edges, squared and averaged over the half and the turn. A pattern's zero vectors make ripple across the flux
+/// linkage, its hexagon ripple along it.
 #[inline(always)]
 pub fn ripple_squares(mode: Mode, modulation_index: f32, omega: f32, free_half_s: f32) -> [f32; 2] {
     let omega = if omega > SLOWEST { omega } else { SLOWEST };
@@ -228,7 +228,7 @@ mod tests {
         sums.map(|sum| sum / f64::from(STEPS) / f64::from(voltage_v).powi(2))
     }
 
-    /// The ripple of patterns is that of their pulses: in all within 6 % of its rms value, and a quarter of its square may be on the wrong axis.
+    /// The ripple of patterns is that of their pulses: as a whole within 6 % of its rms value, and a quarter of its square may be on the wrong axis.
     #[test]
     fn the_squares_are_those_of_patterns() {
         for (mode, least) in [(Mode::Mid7, 0.45), (Mode::Mid5, 0.5), (Mode::Mid3, 0.5), (Mode::Square, 1.0)] {

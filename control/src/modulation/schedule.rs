@@ -1,7 +1,7 @@
 //! The choice of the mode, and the angles at which it may change.
 //!
-//! The modes of a ladder stand in a row; each border between two neighbours has a frequency and a modulation index. Above
-//! either the drive goes up, below both, less a hysteresis, it comes down, and no sooner than a dwell time after
+//! The modes of a ladder form a row; each border between two neighbours has a frequency and a modulation index. Above
+//! either, the drive goes up; below both, less a hysteresis, it comes down, and no sooner than a dwell time after
 //! the last switch. A switch waits for the end of a whole carrier at an angle where both modes' carriers end.
 
 use super::mode::{Regulation, Row};
@@ -9,8 +9,8 @@ use super::{Mode, Reference, SwitchLimits};
 use crate::frames::{Angle, UNITS_PER_RADIAN, six_step_v};
 use crate::time::{Clock, Instant};
 
-/// The border at which a mode gives way to the next one up. Frequencies are shares of the highest switching frequency; each of the pair
-/// is for going up and for coming down.
+/// The border at which a mode gives way to the next one up. Frequencies are shares of the highest switching frequency; the first of each pair
+/// is for going up, the second for coming down.
 #[derive(Clone, Copy, Debug)]
 pub struct Border {
     shares: (f32, f32),
@@ -18,11 +18,11 @@ pub struct Border {
 }
 
 impl Border {
-    /// Of a mode that gives way to none.
+    /// The border of a mode that gives way to none.
     pub(super) const NEVER: Self =
         Self { shares: (f32::INFINITY, f32::INFINITY), indices: (f32::INFINITY, f32::INFINITY) };
 
-    /// Given in Hz for devices of 900 Hz.
+    /// A border given in Hz for devices of 900 Hz.
     pub(super) const fn new(hz: (f32, f32), indices: (f32, f32)) -> Self {
         Self { shares: (hz.0 / 900.0, hz.1 / 900.0), indices }
     }
@@ -33,7 +33,7 @@ impl Border {
     }
 }
 
-/// The locked modes that a drive uses above the asynchronous one, from the lowest frequency up. It leaves each of them where that
+/// The locked modes that a drive uses above the asynchronous one, from the lowest frequency up. The drive leaves each of them where that
 /// mode's row says.
 #[derive(Clone, Copy, Debug)]
 pub struct Ladder(&'static [Mode]);
@@ -46,12 +46,12 @@ impl Ladder {
     #[cfg(feature = "optimal")]
     pub const OPTIMAL: Self = Self::of(&OPTIMAL_RUNGS);
 
-    /// Of these modes; without one the asynchronous mode serves at every frequency.
+    /// A ladder of these modes; without any, the asynchronous mode serves at every frequency.
     pub const fn of(locked: &'static [Mode]) -> Self {
         Self(locked)
     }
 
-    /// `true` of optimised patterns.
+    /// `true` for a ladder of optimised patterns.
     #[cfg(feature = "optimal")]
     fn is_optimal(&self) -> bool {
         self.0.first().is_some_and(|lowest| lowest.is_optimal())
@@ -83,8 +83,8 @@ const INDEX_HYSTERESIS: f32 = 0.012;
 /// Shortest time between two switches of mode, in s.
 const DWELL_S: f32 = 0.03;
 
-/// Share of six-step below which a middle-60° pattern does not wait for that time: made of little but notches, three pulses leave more current there than the
-/// machine has at full torque. A machine of reluctance whose line was lost just after a switch to them, and its torque with it, tripped.
+/// Share of six-step below which a middle-60° pattern does not wait for that time: there it is made of little but notches, and three pulses leave more current
+/// than the machine has at full torque. A reluctance machine whose line, and so its torque, was lost just after a switch to them tripped.
 const PATTERN_WAITS: f32 = 0.75;
 
 /// The choice of mode.
@@ -94,7 +94,7 @@ pub struct Schedule {
     fixed: Option<Mode>,
     last_switch: Option<Instant>,
     dwell_ticks: i32,
-    /// The mode that catches a machine whose ladder's rung is an optimised pattern.
+    /// The mode that catches a machine if the ladder's rung is an optimised pattern.
     #[cfg(feature = "optimal")]
     catches: Mode,
 }
@@ -117,26 +117,26 @@ impl Schedule {
         }
     }
 
-    /// Always the same mode, wherever its pulses lead.
+    /// Always the same mode, whatever its pulses lead to.
     pub const fn fixed(mode: Mode, clock: &Clock) -> Self {
         Self { fixed: Some(mode), ..Self::new(clock) }
     }
 
-    /// The mode that this reference should have, given the present one; the dwell time is respected. Out of rest an optimised pattern
-    /// begins with one that can catch the machine.
+    /// The mode that this reference should have, given the present one; the dwell time is respected. Out of rest, a mode that can catch the machine
+    /// comes before an optimised pattern.
     #[cfg(feature = "optimal")]
     #[inline(never)]
     pub fn wanted(&mut self, now: Instant, mode: Mode, seen: &Reference, devices: &SwitchLimits) -> Mode {
-        /// Modulation index up to which the free carrier can, whatever has to be regulated meanwhile, and the share of the highest switching
+        /// Modulation index up to which the free carrier can catch it, whatever has to be regulated meanwhile, and the share of the highest switching
         /// frequency up to which it has five pulses a turn: with three it beats by ± 75 A at 4,400 r/min.
         const CARRIER_CATCHES: f32 = 0.85;
         const CARRIER_CATCHES_SHARE: f32 = 0.2;
-        /// By how much the modulation index may stay below the operating point's by the map.
+        /// Amount by which the modulation index may stay below the operating point's by the map.
         const MAP_ROOM: f32 = 0.02;
         let asked_index = seen.modulation_index;
         let seen = &Reference { modulation_index: self.filled_index(seen, devices), ..*seen };
-        // No branch has less than its smallest index: where the machine has less flux linkage than its map, or the link jumps up, what is
-        // made counts, at once.
+        // No branch has less than its smallest index: if the machine has less flux linkage than its map, or the link jumps up, the index that
+        // is made counts, at once.
         let seen = &match mode.branch() {
             Some(branch) => {
                 let made = seen.voltage_v / six_step_v(seen.udc_v) + MAP_ROOM;
@@ -153,7 +153,7 @@ impl Schedule {
         match self.ladders_choice(now, mode, seen, devices) {
             wanted if mode != Mode::Off || !wanted.is_optimal() || self.fixed.is_some() => wanted,
             _ => {
-                // The first command is made for the mode that was announced while there was no voltage.
+                // The first command is made for the mode announced while there was no voltage.
                 if seen.voltage_v == 0.0 {
                     let carrier =
                         asked_index < CARRIER_CATCHES && share(seen, devices) < CARRIER_CATCHES_SHARE;
@@ -165,7 +165,7 @@ impl Schedule {
         }
     }
 
-    /// The modulation index that the ladder's borders are held against: the branches of optimised patterns are chosen by what control fills them up to.
+    /// The modulation index compared with the ladder's borders: the branches of optimised patterns are chosen by the index that control fills them up to.
     #[cfg(feature = "optimal")]
     #[inline(always)]
     fn filled_index(&self, seen: &Reference, devices: &SwitchLimits) -> f32 {
@@ -201,18 +201,18 @@ impl Schedule {
             return Mode::Async;
         }
         let notch = shortest_notch(seen.rate, devices);
-        // A free carrier gives way to a locked one first, which leads the flux to where a pattern begins: from a free one it begins at any angle, and
+        // A free carrier first gives way to a locked one, which leads the flux to where a pattern begins: from a free one the pattern begins at any angle, and
         // a machine of 12 kHz that weakened there had a third more current.
         let free = mode == Mode::Async;
         let passes = |below: Mode, from_above: bool| {
             let row = below.row();
-            // Modes of one number of pulses are told apart by modulation index alone.
+            // Modes with the same number of pulses are told apart by modulation index alone.
             let faster = !from_above || row.until.shares != mode.row().until.shares;
             faster && share >= pick(row.until.shares, from_above)
                 || !(free && below.is_carrier())
                     && seen.modulation_index >= pick(reached(row, notch), from_above)
         };
-        // From where the drive stands: up past every border that is passed, else down past those that no longer are.
+        // From the present rung: up past every border that is passed, else down past those that no longer are.
         let place = rungs.iter().position(|rung| *rung == mode).unwrap_or(0);
         let (lower, upper) = rungs.split_at_checked(place).unwrap_or((&[], rungs));
         let mut wanted = *upper.first().unwrap_or(lowest);
@@ -235,8 +235,8 @@ impl Schedule {
         wanted
     }
 
-    /// `true` if a middle-60° pattern of the ladder makes so little voltage that its dwell time does not count. One that only catches a machine for optimised
-    /// patterns stays.
+    /// `true` if a middle-60° pattern of the ladder makes so little voltage that its dwell time does not count. A pattern that only catches a machine for
+    /// optimised patterns stays.
     #[inline(always)]
     fn is_low(&self, mode: Mode, seen: &Reference) -> bool {
         mode.is_pattern()
@@ -256,18 +256,18 @@ fn share(seen: &Reference, devices: &SwitchLimits) -> f32 {
     frequency_share(seen.rate, devices)
 }
 
-/// The same of a `rate` in angle units per tick.
+/// The same for a `rate` in angle units per tick.
 #[inline(always)]
 fn frequency_share(rate: f32, devices: &SwitchLimits) -> f32 {
     rate * (2.0 / 4_294_967_296.0) * devices.shortest_half_ticks as f32
 }
 
-/// Of a border's pair of values the one for this side.
+/// The value of a border's pair for this side.
 fn pick((up, down): (f32, f32), from_above: bool) -> f32 {
     if from_above { down } else { up }
 }
 
-/// The indices of a mode's border, lowered where the mode does not reach them because of the shortest pulse.
+/// The indices of a mode's border, lowered if the shortest pulse keeps the mode from reaching them.
 fn reached(row: &Row, notch: f32) -> (f32, f32) {
     #[cfg(feature = "optimal")]
     if row.branch.is_some() {
@@ -301,22 +301,22 @@ pub fn index_limit(mode: Mode, rate: f32, devices: &SwitchLimits) -> f32 {
     largest(mode.row(), shortest_notch(rate, devices))
 }
 
-/// The fundamental that a pattern should have at least, as a share of six-step, with `rate` in angle units per tick: it rises to the whole where
-/// the devices allow three pulses a turn no longer, so that square wave finds the flux linkage that it forces. Below the frequency at which
-/// it begins it is negative, and no bound. Without it the flux linkage had to grow by a quarter within a turn where no torque is wanted and the link is
+/// The least fundamental that a pattern should have, as a share of six-step, with `rate` in angle units per tick: it rises to the whole where
+/// the devices no longer allow three pulses a turn, so that square wave finds the flux linkage that it forces. Below the frequency at which
+/// it begins it is negative, and no bound. Without it the flux linkage had to grow by a quarter within a turn if no torque was wanted and the link was
 /// high: 194 A at 1,750 V, now 88 A, which square wave itself needs.
 #[inline(always)]
 pub fn index_floor(rate: f32, devices: &SwitchLimits) -> f32 {
-    /// Share of the highest switching frequency where it is nothing, and the one over which it rises to the whole: it is 0.918 where square wave
-    /// gives way on the way down, as much as the pattern of three pulses near six-step is for. Sooner, and magnets are not learnt at 4,000 r/min without torque.
+    /// Share of the highest switching frequency at which it is zero, and the share over which it rises to the whole: it is 0.918 where square wave gives
+    /// way on the way down, as much as the pattern of three pulses near six-step is for. If sooner, magnets are not learnt at 4,000 r/min without torque.
     const FROM_SHARE: f32 = 0.235;
     const OVER_SHARE: f32 = 0.095;
     (frequency_share(rate.abs(), devices) - FROM_SHARE) * (1.0 / OVER_SHARE)
 }
 
-/// The fundamental that a pattern should have at most, as a share of six-step, with `rate` in angle units per tick: between the two frequencies of the free carrier's
-/// border it falls from the whole to the carrier's, so that the free carrier finds the flux linkage that it can hold. Without it a machine that weakens there,
-/// one of 600 V and 3 kHz, lost 93 of 739 N·m for 5 ms when the free carrier took over from square wave.
+/// The most fundamental that a pattern should have, as a share of six-step, with `rate` in angle units per tick: between the two frequencies of the free
+/// carrier's border it falls from the whole to the carrier's, so that the free carrier finds the flux linkage that it can hold. Without it a machine of 600 V
+/// and 3 kHz that weakens there lost 93 of 739 N·m for 5 ms when the free carrier took over from square wave.
 #[inline(always)]
 pub fn index_ceiling(rate: f32, devices: &SwitchLimits) -> f32 {
     const BORDER: (f32, f32) = Mode::Async.row().until.shares;
@@ -347,13 +347,13 @@ pub fn may_switch(from: Mode, to: Mode, next_half: u32) -> bool {
     if from.carriers() == 0 || to.carriers() == 0 {
         return true;
     }
-    // So many of the new mode's carriers have passed, if that is a whole number.
+    // A whole number of the new mode's carriers must have passed.
     (next_half / 2 * to.carriers()).is_multiple_of(from.carriers())
 }
 
-/// The number of the new mode's first half. Between locked modes it begins at the very angle; from a free carrier (or none) a pattern with the carrier
+/// The number of the new mode's first half. Between locked modes it begins at the very angle. From a free carrier (or none) a pattern begins with the carrier
 /// start nearest to the pulse angle, an optimised one with the nearest half, whose length makes up the difference. A carrier begins with the
-/// start that has just passed and catches up: shorter halves have less ripple, longer ones had up to 5 % more of a small current.
+/// start that has just passed and catches up: shorter halves have less ripple; longer ones had up to 5 % more of a small current.
 pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
     match (from.carriers(), to.carriers()) {
         (_, 0) => 0,
@@ -365,7 +365,7 @@ pub fn first_half(from: Mode, to: Mode, next_half: u32, pulse: Angle) -> u32 {
     }
 }
 
-/// The number of the part that a pulse angle lies in, of so many in a turn.
+/// The number of the part that contains a pulse angle, of so many in a turn.
 #[inline(always)]
 fn begun(parts: u32, pulse: Angle) -> u32 {
     ((u64::from(pulse.0) * u64::from(parts)) >> 32) as u32

@@ -2,7 +2,7 @@
 
 use crate::time::Clock;
 
-/// Highest frequency of the free carrier, as a share of the switches', where an optimised pattern follows it: its first edges may come
+/// Highest frequency of the free carrier, as a share of the switches', if an optimised pattern follows it: the pattern's first edges may come
 /// half a carrier early.
 pub const FREE_CARRIER_SHARE: f32 = 0.99;
 
@@ -19,7 +19,7 @@ pub struct SwitchLimits {
 }
 
 impl SwitchLimits {
-    /// From times in ticks and the highest switching frequency in Hz, which is at most the control rate.
+    /// Limits from times in ticks and the highest switching frequency in Hz, which is at most the control rate.
     pub const fn new(
         min_pulse_ticks: u32,
         dead_time_ticks: u32,
@@ -31,12 +31,12 @@ impl SwitchLimits {
         Self { min_pulse_ticks, dead_time_ticks, shortest_half_ticks: half }
     }
 
-    /// The least that [`SwitchLimits::longest_half_ticks`] is, in shortest halves.
+    /// The least value of [`SwitchLimits::longest_half_ticks`], in shortest halves.
     pub const LEAST_RANGE: u32 = 4;
 
-    /// Length of the longest carrier half, in ticks: of a stopped carrier that is locked to the angle. Modes are locked from 1/23.7 of the highest switching
-    /// frequency up; there the longest half that leads the flux linkage to a pattern, over 135°, lasts 17.8 of the shortest. It is 20 of them as far as
-    /// timers of 16 bits count, but 4 at least.
+    /// Length of the longest carrier half, in ticks: that of a stopped carrier that is locked to the angle. Modes are locked from 1/23.7 of the highest
+    /// switching frequency up; there the longest half that leads the flux linkage to a pattern, over 135°, lasts 17.8 of the shortest. The limit is 20 of them
+    /// as far as timers of 16 bits count, but 4 at least.
     pub const fn longest_half_ticks(&self) -> u32 {
         const COUNTED: u32 = 65_000;
         let (most, least) = (20 * self.shortest_half_ticks, Self::LEAST_RANGE * self.shortest_half_ticks);

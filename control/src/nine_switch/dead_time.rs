@@ -1,7 +1,7 @@
 //! Dead-time compensation.
 //!
-//! Where two gates of a leg exchange, one node of the leg floats for the dead time, and its motor's current chooses the
-//! potential: out of the node (positive) it pulls it down, into the node up. As in a two-level leg a rising node so comes late when
+//! When two gates of a leg exchange, one node of the leg floats for the dead time, and its motor's current chooses the
+//! potential: out of the node (positive) it pulls the node down, into the node up. As in a two-level leg, a rising node is late when
 //! the current is positive, a falling one when it is negative:
 //!
 //! | exchange | what floats | current that chooses |
@@ -13,10 +13,10 @@
 //!
 //! A period is its own mirror image, so a border has one instant for its falling and its rising edge. It is moved by half the
 //! dead time: later when the current is positive, earlier when it is negative. Then either edge comes half a dead time late,
-//! and the node is high for as long as it was to be. M's pause cannot be less than none: where its ends would cross, H and L exchange in
+//! and the node is high for as long as intended. M's pause cannot be less than none: if its ends would cross, H and L exchange in
 //! the middle of it.
 //!
-//! Not made up for are two exchanges of a leg within a dead time, and what is late by half a dead time beside a shoot-through,
+//! Not compensated are two exchanges of a leg within a dead time, and what is late by half a dead time beside a shoot-through,
 //! which is not late.
 
 use super::GateTicks;
@@ -26,15 +26,15 @@ use crate::frames::Abc;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DeadTime {
-    /// From one gate of a leg that turns off to another one that turns on, in ticks of [`GateTicks`].
+    /// Time from the turn-off of one gate of a leg to the turn-on of another, in ticks of [`GateTicks`].
     pub ticks: u32,
-    /// Currents below may have either sign by their ripple, and count in proportion; in A, above 0.
+    /// Current below which either sign is possible because of ripple; such currents count in proportion; in A, above 0.
     pub small_a: f32,
 }
 
 impl DeadTime {
-    /// Moves the pauses of the nine gates, in the order of [`GATES`](super::GATES), so that the nodes do what they said;
-    /// `currents_a` are the phase currents that are expected of the upper and of the lower motor, positive into the motor.
+    /// Moves the pauses of the nine gates, in the order of [`GATES`](super::GATES), so that the nodes do as they said;
+    /// `currents_a` are the phase currents expected in the upper and in the lower motor, positive into the motor.
     ///
     /// ```
     /// use tractive_control::frames::Abc;
@@ -60,7 +60,7 @@ impl DeadTime {
         self.leg([wh, wm, wl], upper.c, lower.c);
     }
 
-    /// The same for a leg's H, M and L. A border stays within the pauses of H and L that it is the one end of.
+    /// The same for a leg's H, M and L. A border stays within the pauses of H and L of which it is an end.
     fn leg(self, [high, middle, low]: [&mut GateTicks; 3], upper_a: f32, lower_a: f32) {
         let (fall, step) = (high.off_from, low.off_to);
         let moved = |border: u32, current_a: f32| {
@@ -94,7 +94,7 @@ impl DeadTime {
         }
     }
 
-    /// The way that a border goes with this current of its node.
+    /// The shift of a border for this current of its node.
     #[inline]
     fn shift(self, current_a: f32) -> i32 {
         let share = if current_a > self.small_a {
@@ -114,7 +114,7 @@ mod tests {
 
     const DEAD_TIME: DeadTime = DeadTime { ticks: 200, small_a: 2.0 };
 
-    /// Leg U's pauses, H, M and L, once they are compensated for these currents of the upper and of the lower motor.
+    /// Leg U's pauses, H, M and L, compensated for these currents of the upper and of the lower motor.
     fn leg(pauses: [(u32, u32); 3], currents_a: [f32; 2]) -> [(u32, u32); 3] {
         let mut gates = [GateTicks::default(); 9];
         for (row, (off_from, off_to)) in pauses.into_iter().enumerate() {

@@ -9,14 +9,14 @@ pub const GATES: [&str; 9] = ["UH", "VH", "WH", "UM", "VM", "WM", "UL", "VL", "W
 /// A gate in one carrier period. It is on except in one pause of the rising half, 0 ≤ `off_from` ≤ `off_to` ≤ 1/2, and
 /// that pause's mirror image in the falling half, 1 − `off_to` … 1 − `off_from`.
 ///
-/// For an up-down counter these are two compare values: off while it counts between them, either way. The end of a pause
-/// that lies at 0 or 1/2 is no edge: there the pause meets its mirror image.
+/// For an up-down counter these are two compare values: the gate is off while it counts between them, either way. The end of a pause
+/// at 0 or 1/2 is no edge: there the pause meets its mirror image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GatePattern {
     /// Beginning of the pause, in periods.
     pub off_from: f32,
-    /// End of the pause, in periods; the same as its beginning where the gate is never off.
+    /// End of the pause, in periods; equal to its beginning if the gate is never off.
     pub off_to: f32,
 }
 
@@ -42,8 +42,8 @@ impl GatePattern {
         (from < to).then_some((from, to))
     }
 
-    /// In ticks of a carrier half with `half_ticks` (1 ..= 2²²), each end to the nearest. Rounding keeps order, and what was at
-    /// the same instant stays so: legal legs stay legal.
+    /// The pause in ticks of a carrier half with `half_ticks` (1 ..= 2²²), each end to the nearest. Rounding keeps the order, and ends at
+    /// the same instant stay together: legal legs stay legal.
     #[inline]
     pub fn ticks(&self, half_ticks: u32) -> GateTicks {
         let scale = 2.0 * half_ticks as f32;
@@ -58,7 +58,7 @@ impl GatePattern {
 pub struct GateTicks {
     /// Beginning of the pause.
     pub off_from: u32,
-    /// End of the pause; the same as its beginning where the gate is never off.
+    /// End of the pause; equal to its beginning if the gate is never off.
     pub off_to: u32,
 }
 
@@ -70,19 +70,19 @@ impl GateTicks {
     }
 }
 
-/// The gates of one carrier period, and what they give.
+/// The gates of one carrier period and the resulting voltages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Period {
-    /// In the order of [`GATES`].
+    /// The gates in the order of [`GATES`].
     pub gates: [GatePattern; 9],
     /// The voltages that the motors get.
     pub applied: Applied,
 }
 
 impl Period {
-    /// From the edges of the legs U, V, W.
+    /// The period from the edges of the legs U, V, W.
     #[inline]
     pub(super) fn new(upper: [LegEdges; 3], lower: [LegEdges; 3], applied: Applied) -> Self {
         let high = |upper: LegEdges| GatePattern { off_from: upper.own, off_to: upper.again };

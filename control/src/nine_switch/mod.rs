@@ -1,10 +1,10 @@
-//! The pulses of nine switches: one inverter that feeds two motors, and short-circuits its legs on purpose to boost
+//! The pulses of nine switches: one inverter that feeds two motors and short-circuits its legs on purpose to boost
 //! its Z-source link.
 //!
-//! Three legs of three switches in series, H, M and L; the upper motor hangs on the H–M nodes, the lower motor
-//! on the M–L nodes ([`LegState`]). One triangular carrier a period T, valley at t = 0 in the centre of V15, peak at T/2 in
-//! the centre of V14. The two motors share the time: the lower one has what lies around the valley, the upper one what
-//! lies around the peak. They meet at T/4 and 3T/4, or at a boundary that slides.
+//! Three legs of three switches in series, H, M and L; the upper motor is connected to the H–M nodes, the lower motor
+//! to the M–L nodes ([`LegState`]). One triangular carrier has the period T, with its valley at t = 0 in the centre of V15 and its peak at T/2 in
+//! the centre of V14. The two motors share the time: the lower one has the time around the valley, the upper one the time
+//! around the peak. They meet at T/4 and 3T/4, or at a boundary that slides.
 //!
 //! The period is its own mirror image, so half of it says everything, and in a half every leg makes at most two steps:
 //! −1 → 1 at the lower motor's compare instant l, 1 → 0 at the upper motor's u. With p the phase's share of the unit vector
@@ -14,21 +14,21 @@
 //! l = c₂ + m₂ p₂/4     u = c₁ + m₁ p₁/4     0 ≤ l ≤ b ≤ u ≤ 1/2
 //! ```
 //!
-//! The mean voltages are then (m/2) U_in at θ, whatever the offsets c are: these place the zero vectors, and that is all
-//! in which the schemes differ ([`Scheme`]). So H is off in [u, 1/2], L in [0, l] and M in [l, u]: one pause a gate and
+//! The mean voltages are then (m/2) U_in at θ, whatever the offsets c are. The offsets place the zero vectors, and the schemes
+//! differ in nothing else ([`Scheme`]). So H is off in [u, 1/2], L in [0, l] and M in [l, u]: one pause a gate and
 //! half ([`GatePattern`]). Shoot-through moves one end of one pause at each border of a zero vector.
 //!
 //! # What cannot be
-//! The shoot-through duty is kept first, for it feeds the link both motors live on. Then each motor's voltage is scaled, at its
-//! angle, to what its share of the period leaves: span ≤ 1 − D, where the span is m (p_max − p_min), √3 m at worst.
+//! The shoot-through duty is kept first, because it feeds the link that both motors live on. Then each motor's voltage is scaled, at its
+//! angle, to what its share of the period allows: span ≤ 1 − D, where the span is m (p_max − p_min), √3 m at worst.
 //! With the sliding boundary a motor may also use what the other leaves, and always has 1 − D. [`Applied`] says what was
-//! given and who was limited. A request that is not finite or not in its range is refused by name ([`Refused`]).
+//! given and which motor was limited. A request that is not finite or not in its range is refused by name ([`Refused`]).
 //!
 //! # Dead time
-//! The pulses are ideal. Where two gates of a leg toggle at the same instant, the one that turns on has to wait for the
+//! The pulses are ideal. If two gates of a leg toggle at the same instant, the one that turns on has to wait for the
 //! dead time, in hardware: M after H and H after M (1 ↔ 0), L after M and M after L (−1 ↔ 1), L after H and H after L
-//! (−1 ↔ 0, with M on). Else all three conduct for a moment. At a border with shoot-through nothing has to wait:
-//! there all three are to conduct. [`DeadTime`] moves the pulses so that the motors have their voltages all the same.
+//! (−1 ↔ 0, with M on). Otherwise all three conduct for a moment. At a border with shoot-through nothing has to wait:
+//! all three are meant to conduct there. [`DeadTime`] moves the pulses so that the motors still get their voltages.
 
 #![forbid(unsafe_code)]
 
@@ -53,7 +53,7 @@ use shares::Share;
 use shoot_through::Shoot;
 use vectors::Direction;
 
-/// The mean voltage one motor is to have.
+/// The mean voltage that one motor is to have.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotorVoltage {
@@ -100,7 +100,7 @@ impl Applied {
     }
 }
 
-/// A request without meaning: the value that is not finite, or outside its range.
+/// A request without meaning: the value that is not finite or is outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refused {

@@ -1,8 +1,8 @@
-//! Proofs that the legs of the nine switches are legal, and short-circuit the link where and for as long as they are to, whatever
+//! Proofs that the legs of the nine switches are legal, and short-circuit the link where and for as long as intended, whatever
 //! finite request comes.
 //!
 //! A leg is legal as long as at most one of its gates is off; if none is, it shorts the link. So its pauses must not overlap: 0 ≤ L's ≤ M's ≤ H's ≤
-//! 1/2 (`tests/proofs.rs` shows that this is all). The first two are at the lower motor's edges, below the boundary, the others at the upper
+//! 1/2 (`tests/proofs.rs` shows that nothing else is needed). The first two are at the lower motor's edges, below the boundary, the others at the upper
 //! motor's, above it: each share is legal by itself, or it is not. Its edges are made of six numbers, of which only two matter:
 //!
 //! - Every operation is rounded to the nearest number, so it keeps order: `a ≤ b` gives `a + c ≤ b + c` as they are computed. Whatever is added
@@ -12,7 +12,7 @@
 //!   2⁻²⁶ of a period, so there are 2²⁴ of them; each is tried with the largest duty that it is made of, and with an
 //!   active time four numbers larger than the code made of it here: `room / span * span` is rounded twice, by 2⁻²⁴ of it each.
 //!
-//! A boundary that slides has two active times in one number: there the roundings are added up, and corners are tried.
+//! A sliding boundary has two active times in one number: there the roundings are added up, and corners are tried.
 
 extern crate std;
 
@@ -55,8 +55,8 @@ fn every_direction_has_a_gap_within_its_span() {
     });
 }
 
-/// The farthest that the last step is from the boundary with half the zero voltage inside, for this active time and every smaller one. Its place
-/// is 1/8 and half the active time; two roundings come to that, of 2⁻²⁸ and of 2⁻²⁷.
+/// The farthest distance of the last step from the boundary with half the zero voltage inside, for this active time and every smaller one. Its place
+/// is 1/8 and half the active time; two roundings are added to that, of 2⁻²⁸ and of 2⁻²⁷.
 fn farthest(span: f32) -> f32 {
     let bound = 0.125 + 0.5 * f64::from(span) + if span > 0.0 { 0.75 * f64::from(STEP) } else { 0.0 };
     let nearest = bound as f32;
@@ -90,7 +90,7 @@ fn largest_duties(number: u64) -> impl Iterator<Item = f32> {
     [Some(duty), is_rounded.then(|| duty.next_down())].into_iter().flatten()
 }
 
-/// The edges of a share from its boundary outward, each of which has to be beyond the one before.
+/// The edges of a share from its boundary outward, each of which must lie beyond the one before.
 fn outward(share: &Share, edges: &[LegEdges; 3]) -> [f32; 8] {
     let [near, between, far] = edges;
     let way = |instant: f32| share.outward * instant;
@@ -106,7 +106,7 @@ fn outward(share: &Share, edges: &[LegEdges; 3]) -> [f32; 8] {
     ]
 }
 
-/// `true` if a share's edges are in order, and its legs short the link for as long as they are to.
+/// `true` if a share's edges are in order, and its legs short the link for as long as intended.
 fn is_legal(share: &Share, steps: &Steps, (inner, central, duty): (f32, bool, f32)) -> bool {
     let edges = Shoot::new(duty, inner, central).insert(steps, share);
     let [near, between, far] = &edges;

@@ -59,7 +59,7 @@ pub(super) struct Sequence {
 impl Sequence {
     #[inline]
     pub fn of(scheme: Scheme, upper: &Direction, lower: &Direction) -> Self {
-        // Where a phase is at its positive peak, V14 and V15 let that phase's leg rest.
+        // A phase at its positive peak: V14 and V15 let that phase's leg rest.
         let by_angle = |direction: &Direction| if direction.peak { 0.0 } else { 1.0 };
         let (upper_inner, lower_inner) = match scheme {
             Scheme::S => (0.5, 0.5),
@@ -85,12 +85,12 @@ pub(super) struct Steps {
 }
 
 /// The steps in a share, with the part `inner` of its zero time next to the boundary; `gap`, in periods, is the time of the
-/// active vector next to it.
+/// active vector next to the boundary.
 #[inline]
 pub(super) fn steps(share: &Share, inner: f32, gap: f32) -> Steps {
     let length = share.outward * (share.end - share.boundary);
     // Exactly 0 without an inner zero vector; and without an outer one `far` is exactly the share's length. So no step at the
-    // boundary or at the end becomes two.
+    // boundary or at the end is split into two.
     let near = inner * (length - share.span);
     Steps { near, between: near + gap, far: near + share.span }
 }

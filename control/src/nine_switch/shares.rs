@@ -4,7 +4,7 @@ use super::vectors::Direction;
 use super::{Applied, Request};
 
 /// The part of a share kept free besides active vectors and shoot-through, in periods, so that rounding never lets one share reach
-/// into the other. A voltage less by four times this (two shares' worth, and rounding) is not reported as limited.
+/// into the other. A voltage lower by four times this (two shares' worth, and rounding) is not reported as limited.
 const ROUNDING: f32 = 1.0 / 8_388_608.0;
 
 /// One motor's part of the rising half.
@@ -36,7 +36,7 @@ pub(super) fn divide(request: &Request, slides: bool, upper: &Direction, lower: 
     let room = larger(0.25 - 0.25 * request.shoot_through - ROUNDING, 0.0);
     let (mut upper_room, mut lower_room) = (room, room);
     if slides {
-        // What the other leaves of its own is to be had as well.
+        // What the other leaves of its own is available as well.
         upper_room = larger(room, 2.0 * room - m2 * lower.span);
         lower_room = larger(room, 2.0 * room - m1 * upper.span);
     }

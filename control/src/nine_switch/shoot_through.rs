@@ -1,8 +1,8 @@
 //! The instants at which the link is shorted.
 //!
 //! In each half of the period each motor's share holds D T/4, one leg at a time, at the borders between its zero and its
-//! active vectors: the leg that steps there keeps the gate that turns off on a little longer, or turns on the other
-//! a little earlier, on the zero vector's side. So active vectors keep their time, and no gate toggles once more.
+//! active vectors: the leg that steps there keeps the gate that turns off on a little longer, or turns the other gate on
+//! a little earlier, on the zero vector's side. So active vectors keep their time, and no gate toggles an extra time.
 //!
 //! | zero vector | gate | leg of |
 //! |---|---|---|
@@ -11,20 +11,20 @@
 //! | V13, upper motor's part | M on earlier | its smallest phase |
 //! | V13, lower motor's part | M off later | its largest phase |
 //!
-//! Two exceptions: a motor without voltage never steps where all its zero time is V13, so M makes a pulse there for the
-//! shoot-through; and where shoot-through fills V13 to the last, one leg's M has no pause left and toggles less.
+//! Two exceptions: a motor without voltage never steps if all its zero time is V13, so M makes a pulse there for the
+//! shoot-through; and if shoot-through fills V13 completely, one leg's M has no pause left and toggles less.
 
 use super::sequence::Steps;
 use super::shares::Share;
 
-/// One leg's edges in the rising half on account of one motor, in periods.
+/// One leg's edges in the rising half due to one motor, in periods.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LegEdges {
-    /// Of the motor's own gate: H off for the upper motor, L on for the lower one.
+    /// Edge of the motor's own gate: H off for the upper motor, L on for the lower one.
     pub own: f32,
     /// The other end of that gate's pause: the end of the motor's share unless the shoot-through is central.
     pub again: f32,
-    /// Of M.
+    /// Edge of M.
     pub middle: f32,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct Shoot {
 }
 
 impl Shoot {
-    /// The motor's part of the `duty` (0 ..= 1), of whose zero time the part `inner` is V13.
+    /// The motor's part of the `duty` (0 ..= 1), if the part `inner` of its zero time is V13.
     #[inline]
     pub fn new(duty: f32, inner: f32, central: bool) -> Self {
         let inside = 0.25 * duty * inner;

@@ -6,7 +6,7 @@
 
 use crate::frames::Angle;
 
-/// The state that the three switches of a leg make of its two nodes.
+/// The state of a leg's two nodes that its three switches make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LegState {
@@ -65,7 +65,7 @@ pub(super) struct Direction {
 impl Direction {
     #[inline]
     pub fn of(angle: Angle) -> Self {
-        // 60° is no whole number of units: one more, so that what is rounded down to a border counts as beyond it.
+        // 60° is not a whole number of units: one more, so that a value rounded down to a border counts as beyond it.
         let sectors = u64::from(angle.0.wrapping_add(1)) * 6;
         let (sector, within) = ((sectors >> 32) as u32, sectors as u32);
         // φ as a share of 30°, −1 ..= 1.

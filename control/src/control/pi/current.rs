@@ -1,21 +1,21 @@
-//! Two PIs in the rotor's frame, decoupled, behind the circle of the largest voltage.
+//! Two PIs in the rotor's frame, decoupled, limited by the circle of the largest voltage.
 
 use super::super::Regulated;
 use crate::frames::Dq;
 
-/// The design of the loops for what a mode can follow.
+/// The loops' design for a mode, by what that mode can follow.
 #[derive(Clone, Copy, Debug)]
 pub struct Design {
-    /// Carrier halves from a sample to the middle of what a command makes of it. The textbook's are 1.5; a pattern follows later.
+    /// Carrier halves from a sample to the middle of its command's effect. The textbook's are 1.5; a pattern follows later.
     pub delay_halves: f32,
-    /// Integral time, in these delays: L/R with the largest current where carriers follow, longer where the angle alone does.
+    /// Integral time, in these delays: L/R with the largest current under carriers, longer if the angle alone follows.
     integral_delays: f32,
-    /// Share of the reference in the current that decouples; the rest is measured. In square wave that alone is too old.
+    /// Share of the reference in the current that decouples; the rest is measured. In square wave the measured current alone is too old.
     pub set_share: f32,
 }
 
 impl Design {
-    /// That for a mode.
+    /// The design for a mode.
     pub const fn of(follows: Regulated) -> Self {
         match follows {
             Regulated::Mean => Self { delay_halves: 1.5, integral_delays: 40.0, set_share: 0.0 },
@@ -34,13 +34,13 @@ pub struct Loop {
     integral: Dq,
 }
 
-/// Everything that a step works on.
+/// The inputs of a step.
 pub struct Input {
     /// Reference, the newest sample and the current without ripple, in A.
     pub reference: Dq,
     pub measured: Dq,
     pub without_ripple: Dq,
-    /// The voltage that decouples, and the drop of the reference, in V.
+    /// The decoupling voltage and the resistive drop of the reference, in V.
     pub forward: Dq,
     /// Incremental inductances.
     pub inductance: Inductance,
@@ -56,13 +56,13 @@ pub struct Input {
 
 /// Voltages, in V.
 pub struct Output {
-    /// To be made.
+    /// Voltage to be made.
     pub voltage: Dq,
     /// Its length.
     pub length_v: f32,
-    /// Length of what was asked for.
+    /// Length of the voltage that was asked for.
     pub wanted_v: f32,
-    /// Without the proportional part.
+    /// Voltage without the proportional part.
     pub steady: Dq,
 }
 
@@ -71,7 +71,7 @@ impl Loop {
     pub const AT_REST: Self = Self { integral: Dq { d: 0.0, q: 0.0 } };
 
     /// One step. Modulus optimum: with T the sum of the delays the gain is L/(2 T). The proportional part takes the newest sample, the
-    /// integral one what has no ripple.
+    /// integral part the current without ripple.
     pub fn step(&mut self, input: &Input) -> Output {
         let Input { reference, inductance, design, limit_v, .. } = *input;
         let delay_s = design.delay_halves * input.half_s;
@@ -83,7 +83,7 @@ impl Loop {
         let fits = (wanted_v <= limit_v && !input.fills) || wanted_v == 0.0;
         let (voltage, length_v) =
             if fits { (wanted, wanted_v) } else { (wanted * (limit_v / wanted_v), limit_v) };
-        // Held back by the voltage that is not to be had.
+        // Held back by the voltage that is not available.
         let error = inductance.of(reference - input.without_ripple) * per_s;
         let share = input.passed_s / (design.integral_delays * delay_s);
         self.integral = self.integral + (error + voltage - wanted) * share;
@@ -91,12 +91,12 @@ impl Loop {
     }
 }
 
-/// Incremental inductances, in H: the flux linkage of both axes for the current of one.
+/// Incremental inductances, in H: the flux linkage of both axes for the current of one axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Inductance {
-    /// For the current of d.
+    /// For the d-axis current.
     pub by_d: Dq,
-    /// For the current of q.
+    /// For the q-axis current.
     pub by_q: Dq,
 }
 

@@ -1,11 +1,11 @@
 //! The papers' own, ordinary control law: PI loops on measured currents.
 //!
-//! It is what an engineer builds of the papers and a textbook, to be run beside [`Controller`](super::Controller) on the same ports, tables
-//! and modulator. Currents are measured where the carrier has no ripple, under the patterns as their mean over 60°. The reference is that
-//! of MTPA in the paper's two passes; where the voltage runs out, an integrator on it moves i_d. Two PIs, decoupled by `jωψ` of the
-//! maps, have the gains of the modulus optimum, and their integrators are held back at the circle of the largest voltage.
+//! It is what an engineer builds from the papers and a textbook, to be run beside [`Controller`](super::Controller) on the same ports, tables
+//! and modulator. Currents are measured where the carrier has no ripple; under the patterns their mean over 60° is used. The reference is that
+//! of MTPA in the paper's two passes; when the voltage runs out, an integrator on it moves i_d. Two PIs, decoupled by `jωψ` of the
+//! maps, have the gains of the modulus optimum; their integrators are held back at the circle of the largest voltage.
 //!
-//! Nothing here knows which pulses are on their way: no prediction, no ripple, no disturbance but the integrators.
+//! Nothing here knows which pulses are on their way: there is no prediction, no ripple, and no disturbance but the integrators.
 //!
 //! From 600 to 700 N·m at standstill, the first voltage is that of the proportional part and what the integrator and the drop add:
 //!
@@ -61,10 +61,10 @@ use weakening::Weakening;
 
 pub use reference::MtpaStart;
 
-/// Bandwidth at which the link is followed for the limit of the voltage, in rad/s.
+/// Bandwidth with which the voltage limit follows the link, in rad/s.
 const LINK_RAD_S: f32 = 100.0;
 
-/// Step of current over which an incremental inductance is taken, in A.
+/// Current step over which an incremental inductance is taken, in A.
 const STEP_A: f32 = 10.0;
 
 /// The law's state between two control periods.
@@ -78,7 +78,7 @@ pub struct PiLaw {
     samples: Samples,
     /// The link without its ripple, in V; `None` before the first operating point.
     link_v: Option<f32>,
-    /// Torque by the map, summed over the samples since the last operating point, in N·m; and how many they are.
+    /// Torque by the map, summed over the samples since the last operating point, in N·m; and their number.
     sum_nm: f32,
     count: u32,
     /// Samples since the last voltage.
@@ -89,17 +89,17 @@ pub struct PiLaw {
 }
 
 impl PiLaw {
-    /// At rest; MTPA starts from the point of the period before.
+    /// The law at rest; MTPA starts from the point of the period before.
     pub const fn new() -> Self {
         Self::starting(MtpaStart::Previous)
     }
 
-    /// At rest, with MTPA started as told.
+    /// The law at rest, with the given start of MTPA.
     pub const fn starting(start: MtpaStart) -> Self {
         Self::with_tracker(SpeedTracker::new(), start)
     }
 
-    /// At rest, with a speed tracker of this natural frequency, in rad/s; MTPA starts from the point of the period before.
+    /// The law at rest, with a speed tracker of this natural frequency, in rad/s; MTPA starts from the point of the period before.
     pub const fn with_tracking(natural_rad_s: f32) -> Self {
         Self::with_tracker(SpeedTracker::with_natural(natural_rad_s), MtpaStart::Previous)
     }
@@ -249,7 +249,7 @@ impl ControlLaw for PiLaw {
 }
 
 impl PiLaw {
-    /// EMF of what flows while the gates are off, from which a pattern begins.
+    /// EMF of the flux that is present while the gates are off, from which a pattern begins.
     fn start_flying(&self, sample: &RotorSample, omega: f32) -> VoltageVector {
         let emf = sample.flux.j() * omega;
         let vector = emf.unpark(sample.frame);
@@ -257,7 +257,7 @@ impl PiLaw {
     }
 }
 
-/// Incremental inductances at a current with its flux linkage, in H: what the flux linkage of both axes gains by the current of each.
+/// Incremental inductances at a current with its flux linkage, in H: the gain of both axes' flux linkage with the current of each.
 fn inductance(tables: &Tables, current: Dq, flux: Dq) -> Inductance {
     let further = |d: f32, q: f32| (flux_linkage(tables, current + Dq { d, q }) - flux) * (1.0 / STEP_A);
     Inductance { by_d: further(STEP_A, 0.0), by_q: further(0.0, STEP_A) }
@@ -298,7 +298,7 @@ mod tests {
         }
     }
 
-    /// So many halves towards a reference; the currents' largest q on the way, and the last voltage that was asked for.
+    /// So many halves towards a reference; the largest q current on the way, and the last voltage that was asked for.
     fn drive(plant: &mut Plant, loops: &mut Loop, reference: Dq, limit_v: f32, halves: usize) -> (f32, f32) {
         let (mut highest_a, mut wanted_v) = (0.0_f32, 0.0);
         for _ in 0..halves {
@@ -369,7 +369,7 @@ mod tests {
             weakening.step(&input(moved_a, wanted_v(moved_a)));
         }
         assert!((wanted_v(weakening.moved_a()) - 776.0).abs() < 1.0, "{} A", weakening.moved_a());
-        // With voltage to spare it goes back to MTPA, and no further.
+        // With voltage to spare it returns to MTPA, and no further.
         for _ in 0..2_000 {
             weakening.step(&input(weakening.moved_a(), 400.0));
         }

@@ -1,17 +1,17 @@
-//! The current reference: MTPA in the paper's two passes, and the same torque with more negative i_d where the field is weakened.
+//! The current reference: MTPA in the paper's two passes; in field weakening, the same torque with more negative i_d.
 
 use super::super::{Region, flux_linkage, mtpa_passes, torque_nm};
 use crate::frames::{Dq, limit, sqrt};
 use crate::machine::Tables;
 
-/// The point whose inductances the first of the two passes takes. The paper does not say.
+/// The point whose inductances the first of the two passes takes. The paper does not name it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MtpaStart {
-    /// That of the operating point before: with each one the passes come nearer to where they no longer move.
+    /// The previous operating point: with each one the passes come nearer to where they no longer move.
     #[default]
     Previous,
-    /// No current: the plain reading of the paper.
+    /// Zero current: the plain reading of the paper.
     Zero,
 }
 
@@ -28,12 +28,12 @@ pub struct Reference {
 pub struct Point {
     /// Current, in A.
     pub current: Dq,
-    /// Flux linkage that belongs to it by the map, in Wb.
+    /// Flux linkage for that current by the map, in Wb.
     pub flux: Dq,
-    /// Torque that it gives by the map, in N·m; the torque wanted where nothing limits it.
+    /// Torque that it gives by the map, in N·m; the wanted torque if nothing limits it.
     pub torque_nm: f32,
     pub region: Region,
-    /// The current of MTPA, in A.
+    /// The MTPA current, in A.
     mtpa: Dq,
 }
 
@@ -47,7 +47,7 @@ impl Reference {
         self.start
     }
 
-    /// The reference for a torque in N·m, with i_d moved off that of MTPA by `moved_a`, in A.
+    /// The reference for a torque in N·m, with i_d moved by `moved_a`, in A, from that of MTPA.
     pub fn step(&mut self, wanted_nm: f32, moved_a: f32, tables: &Tables) -> Point {
         let ratings = &tables.ratings;
         let wanted = wanted_nm.abs();
@@ -79,19 +79,19 @@ impl Reference {
     }
 }
 
-/// The current of a torque in N·m, of at least zero, with i_d off that of MTPA; equation (2) with the inductances at a point.
+/// The current for a torque in N·m, at least zero, with i_d off that of MTPA; equation (2) with the inductances at a point.
 fn moved(mtpa: Dq, at: Dq, moved_a: f32, torque: f32, tables: &Tables) -> Dq {
     let [psi_f, saliency] = tables.mtpa.parameters.at(at.d, at.q);
     let d = tables.ratings.kept_id_a(mtpa.d + moved_a);
     let effective = psi_f - saliency * d;
-    // Where magnets and saliency cancel no current gives the torque.
+    // If magnets and saliency cancel, no current gives the torque.
     let least = 0.1 * psi_f;
     let effective = if effective > least { effective } else { least };
     Dq { d, q: torque / (1.5 * tables.ratings.pole_pairs * effective) }
 }
 
 impl Point {
-    /// Voltage of the point of MTPA at an electrical angular speed, in V.
+    /// Voltage of the MTPA point at an electrical angular speed, in V.
     pub fn mtpa_voltage_v(&self, omega: f32, tables: &Tables) -> f32 {
         let flux = flux_linkage(tables, self.mtpa);
         (flux.j() * omega + self.mtpa * tables.ratings.stator_resistance_ohm).length()

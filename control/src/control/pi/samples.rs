@@ -1,14 +1,14 @@
-//! The currents that the loops regulate: where the carrier has no ripple, or the mean over a sixth of a turn.
+//! The currents that the loops regulate: those where the carrier has no ripple, or the mean over a sixth of a turn.
 
 use crate::frames::Dq;
 
-/// Samples that are kept: a sixth of a turn at 70 Hz, at 20 kHz.
+/// Number of samples kept: a sixth of a turn at 70 Hz, at 20 kHz.
 const KEPT: usize = 48;
 
 /// The newest samples, rotor frame, in A.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples {
-    /// At the newest carrier boundary.
+    /// The sample at the newest carrier boundary.
     pub boundary: Option<Dq>,
     kept: [Dq; KEPT],
     newest: usize,
@@ -16,7 +16,7 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// None yet.
+    /// The state without samples.
     pub const EMPTY: Self = Self { boundary: None, kept: [Dq { d: 0.0, q: 0.0 }; KEPT], newest: 0, count: 0 };
 
     /// Takes a control period's sample.
@@ -28,7 +28,7 @@ impl Samples {
         self.count = (self.count + 1).min(KEPT);
     }
 
-    /// The mean over so many control periods, or over what there is of them.
+    /// The mean over so many control periods, or over as many as there are.
     pub fn mean(&self, window: f32) -> Dq {
         let most = self.count as f32;
         let window = if window < most { window } else { most };

@@ -1,25 +1,25 @@
-//! Field weakening by voltage feedback: where the loops ask for more voltage than there is, i_d is moved.
+//! Field weakening by voltage feedback: if the loops ask for more voltage than there is, i_d is moved.
 
 use crate::frames::limit;
 
 /// Bandwidth of the feedback, in rad/s: well below that of the current loops.
 const BANDWIDTH_RAD_S: f32 = 30.0;
-/// Share of the largest voltage that weakening leaves to the steady state; the rest regulates.
+/// Share of the largest voltage that weakening leaves to the steady state; the rest is for regulation.
 const STEADY_SHARE: f32 = 0.97;
 
 /// The integrator on the voltage.
 #[derive(Clone, Copy, Debug)]
 pub struct Weakening {
-    /// By how much i_d is off that of MTPA, in A.
+    /// Shift of i_d from that of MTPA, in A.
     moved_a: f32,
 }
 
-/// Everything that a step works on.
+/// The inputs of a step.
 pub struct Input {
-    /// The voltage that the loops ask for, and the largest one, in V.
+    /// The voltage that the loops ask for, and the largest voltage, in V.
     pub wanted_v: f32,
     pub limit_v: f32,
-    /// `true` if the voltage always is the largest one: then i_d moves either way.
+    /// `true` if the voltage is always the largest one: then i_d moves either way.
     pub filled: bool,
     /// Reactance and resistance of the d axis, in ohm.
     pub reactance_ohm: f32,
@@ -34,7 +34,7 @@ pub struct Input {
 impl Weakening {
     pub const NONE: Self = Self { moved_a: 0.0 };
 
-    /// By how much i_d is off that of MTPA, in A.
+    /// Shift of i_d from that of MTPA, in A.
     pub const fn moved_a(&self) -> f32 {
         self.moved_a
     }

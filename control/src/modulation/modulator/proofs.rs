@@ -93,7 +93,7 @@ fn every_locked_switch_is_announced_and_legal() {
     assert!(switches > 4_000);
 }
 
-/// A carrier that is not next to its angle does not give way to a pattern, however long it takes; to another carrier it does.
+/// A carrier that is off its angle does not give way to a pattern, however long that lasts; to another carrier it does.
 #[test]
 fn a_pattern_waits_until_the_carrier_keeps_its_angle() {
     let away = [KEPT_ANGLE, KEPT_ANGLE + Angle(1), Angle::DEG_90, Angle(1 << 31)];
@@ -136,7 +136,7 @@ fn a_step_of_torque_takes_an_announced_pattern_back() {
     }
 }
 
-/// A switch that is announced comes, whatever is wanted meanwhile, and nothing else comes before.
+/// An announced switch comes, whatever is wanted meanwhile, and nothing else comes before it.
 #[test]
 fn a_switch_that_is_announced_comes_whatever_is_wanted_meanwhile() {
     for (from, to) in locked().flat_map(|from| locked().map(move |to| (from, to))).filter(|(a, b)| a != b) {

@@ -9,8 +9,8 @@ use core::f32::consts::FRAC_PI_2;
 /// The ripple flux where half number `half` begins, in Wb, in the stationary frame of the (mirrored) turn, for a fundamental of
 /// `voltage_v` (peak phase) at a stator frequency of `omega` (rad/s, greater than zero); `None` for modes of another kind.
 ///
-/// It is counted from where a carrier's sampled fundamental stands at its boundaries, outside the circle by x/sin x with x half the
-/// angle of a half, as control does.
+/// As in control, it is counted from where a carrier's sampled fundamental stands at its boundaries: outside the circle by x/sin x, with x half the
+/// angle of a half.
 #[inline(never)]
 pub fn ripple(mode: Mode, half: u32, voltage_v: f32, udc_v: f32, omega: f32) -> Option<AlphaBeta> {
     let branch = mode.branch()?;
@@ -27,7 +27,7 @@ pub fn ripple(mode: Mode, half: u32, voltage_v: f32, udc_v: f32, omega: f32) -> 
 }
 
 impl Pattern<'_> {
-    /// The flux where half number `half` begins, in units of half the link's voltage over the stator frequency.
+    /// The flux at the beginning of half number `half`, in units of half the link's voltage over the stator frequency.
     fn path(&self, half: u32) -> AlphaBeta {
         let third = self.branch.quarter() * 4 / 3;
         let [a, b, c] = [half, half + 2 * third, half + third].map(|half| self.phase_path(half));
@@ -41,7 +41,7 @@ impl Pattern<'_> {
         let mirrored = quadrant & 1 != 0;
         let place = if mirrored { quarter - rest } else { rest };
         let left = self.left_from(place as f32 * self.branch.half_rad());
-        // Odd about 90°, and turned over in the second half wave.
+        // Odd about 90°, and inverted in the second half wave.
         if quadrant == 1 || quadrant == 2 { left } else { -left }
     }
 

@@ -6,7 +6,7 @@ use crate::frames::{Abc, AlphaBeta};
 use crate::modulation::{CarrierHalf, SwitchLimits};
 
 impl Branch {
-    /// The half, counted from 0° and again every 60°, with which the `next` branch takes over, which lies above this one or below. It is where
+    /// The half, counted from 0° and again every 60°, with which the `next` branch takes over, which lies above this one or below. There
     /// the half before can lead the flux from path to path at any modulation index ([`last_half`]).
     pub fn takes_over(&self, next: &Self, is_above: bool) -> u32 {
         let sector = 2 * self.halves;
@@ -16,10 +16,10 @@ impl Branch {
             _ => 0,
         };
         match [self.place, next.place] {
-            // Before two phases have edges again: for 40° before it only one has, and what is wrong then stays.
+            // Before two phases have edges again: for 40° before it only one phase has edges, and an error then stays.
             _ if self.halves == next.halves && self.angles > next.angles => sector - 1,
             _ if self.halves == next.halves && is_above => joint(self, next),
-            // The last half is the same, in a turn seen backward.
+            // The last half is the same in a turn seen backward.
             _ if self.halves == next.halves => (sector + 1 - joint(next, self)) % sector,
             [2, 3] | [3, 2] if self.angles == next.angles => sector / 6,
             [0, 1..=3] | [1..=3, 0] | [1, 1 | 3] | [3, 1] | [2, 2] => 0,
@@ -32,8 +32,8 @@ impl Branch {
     }
 }
 
-/// The last half of the branch `from` before the branch `to`, with the volt-seconds of a half of `from` and `more_ticks`. At its end stand the
-/// levels of either: those with which its edges come nearer to what is wanted.
+/// The last half of the branch `from` before the branch `to`, with the volt-seconds of a half of `from` and `more_ticks`. At its end are the
+/// levels of either branch: those with which its edges come nearer to what is wanted.
 pub fn last_half(
     (from, to): (&Branch, &Branch),
     half: u32,
@@ -79,7 +79,7 @@ mod tests {
     const DEVICES: SwitchLimits =
         SwitchLimits { min_pulse_ticks: 50, dead_time_ticks: 0, shortest_half_ticks: 10_000 };
 
-    /// The flux that is missing, as a share of the fundamental's, where `to` takes over from `from` after its last half number `half`.
+    /// The missing flux, as a share of the fundamental's, if `to` takes over from `from` after its last half number `half`.
     fn missing(from: Mode, to: Mode, half: u32, index: f32) -> f32 {
         let (old, new) = (from.branch().unwrap(), to.branch().unwrap());
         let voltage_v = index * six_step_v(LINK_V);
@@ -94,13 +94,13 @@ mod tests {
         (got - led * to_ticks).squared().sqrt() / to_ticks / voltage_v
     }
 
-    /// `true` where two modes have modulation indices in common.
+    /// `true` if two modes have modulation indices in common.
     fn overlap(one: Mode, other: Mode) -> bool {
         let (one, other) = (one.branch().unwrap(), other.branch().unwrap());
         one.first.max(other.first) + 0.005 < one.last.min(other.last)
     }
 
-    /// Both ways between two modes, at each modulation index that both have, and every 60°. Returns the largest share that is missing.
+    /// Both ways between two modes, at each modulation index that both have, and every 60°. Returns the largest missing share.
     fn worst(lower: Mode, upper: Mode) -> f32 {
         let (below, above) = (lower.branch().unwrap(), upper.branch().unwrap());
         // Three pulses are for frequencies at which the reference machine's magnets alone take half of the link.

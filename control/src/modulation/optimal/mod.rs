@@ -1,12 +1,12 @@
 //! The optimised patterns: pulses of least distortion, whose edges stand at angles from a table.
 //!
-//! A pattern is quarter-wave symmetric: each phase changes its level at 0, at each of its angles, and mirrored at 90°; the second half
-//! wave is the first one turned over. Its carrier halves all have the same angle, and no more than one edge of a phase. A mode is a
+//! A pattern is quarter-wave symmetric: each phase changes its level at 0, at each of its angles, and at their mirror images about 90°; the second half
+//! wave is the first one inverted. Its carrier halves all have the same angle, and no more than one edge of a phase. A mode is a
 //! branch of optima that lie continuously beside each other over the modulation index.
 //!
-//! In steady state the flux runs along the pattern's own path, which control knows at each boundary ([`ripple`]). Where the flux is off
-//! it, control asks for another mean voltage than the fundamental; the next edges then move by what that is in volt-seconds, as far as
-//! their phases allow and the shortest pulse is kept. What is left then is seen again at the next boundary.
+//! In steady state the flux runs along the pattern's own path, which control knows at each boundary ([`ripple`]). If the flux is off
+//! this path, control asks for a mean voltage other than the fundamental; the next edges then move by the difference in volt-seconds, as far as
+//! their phases allow and the shortest pulse is kept. The remainder is seen again at the next boundary.
 
 mod flux;
 mod meeting;
@@ -30,9 +30,9 @@ pub struct Branch {
     pub halves: u32,
     /// The half, counted from 0° and again every 60°, at whose beginning the flux lies next to its fundamental.
     calm: u32,
-    /// The place among the branches of as many pulses, from the smallest modulation index up: tells the shape of its flux path.
+    /// The place among the branches with as many pulses, from the smallest modulation index up: tells the shape of its flux path.
     place: u32,
-    /// Angles in a quarter turn: the pulses of a turn are twice as many and one.
+    /// Angles in a quarter turn: a turn has twice as many pulses and one.
     pub angles: usize,
     /// Modulation index of the first and last node.
     pub first: f32,
@@ -63,7 +63,7 @@ impl Branch {
         limit(index, self.first, self.last)
     }
 
-    /// The pattern at a modulation index; beyond the window that of its end.
+    /// The pattern at a modulation index; beyond the window, the pattern at its end.
     fn pattern(&self, index: f32) -> Pattern<'_> {
         let place = (self.within(index) - self.first) * self.inverse_step;
         let node = place as usize;

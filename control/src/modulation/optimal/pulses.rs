@@ -4,16 +4,16 @@ use super::{Branch, Pattern};
 use crate::frames::{AlphaBeta, limit};
 use crate::modulation::{CarrierHalf, SwitchLimits};
 
-/// Share of a half's ticks from which volt-seconds are far off.
+/// Share of a half's ticks from which volt-seconds count as far off.
 const FAR_SHARE: f32 = 0.1;
-/// Part of what lies across that is then made along. Chosen by trial, for errors of any size: 0.3 leaves 231 A of 306, 0.6 190 A, 1 172 A; with 1.5 a start goes
-/// astray.
+/// Part of the volt-seconds across the direction that is then made along it. Chosen by trial, for errors of any size: 0.3 leaves 231 A of 306, 0.6 190 A,
+/// 1 172 A; with 1.5 a start goes astray.
 const LEAN: f32 = 0.5;
 
 /// One phase's part of a carrier half.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Part {
-    /// Level at its beginning.
+    /// Level at the beginning of the half.
     pub level: bool,
     /// The place of its edge, as a share of the half.
     pub edge: Option<f32>,
@@ -21,8 +21,8 @@ pub(super) struct Part {
     pub jumps: (bool, bool),
 }
 
-/// A half of a branch's pattern at a modulation index, `period_ticks` long, with its edges moved so that it has `more_ticks` of volt-seconds
-/// more, over the link's voltage, in the stationary frame of the (mirrored) turn.
+/// A half of a branch's pattern at a modulation index, `period_ticks` long, with its edges moved so that it has `more_ticks` of additional
+/// volt-seconds, over the link's voltage, in the stationary frame of the (mirrored) turn.
 pub fn half(
     branch: &Branch,
     half: u32,
@@ -37,8 +37,8 @@ pub fn half(
     played(&parts, period_ticks, if leans { leaning(more_ticks) } else { more_ticks }, devices)
 }
 
-/// Volt-seconds that lead the flux linkage to its magnitude by the one direction that there is, the voltage's, to which the magnitude lies
-/// across: flux linkage that is turned ahead grows, turned back it shrinks. Far from it the magnitude never gets there without: with a tenth less
+/// Volt-seconds that lead the flux linkage to its magnitude by the one available direction, the voltage's, which lies across the
+/// magnitude: flux linkage turned ahead grows, turned back it shrinks. Without this, a magnitude that is far off never gets there: with a tenth less
 /// than by the map 306 A flowed when torque fell to none at 1,196 r/min, now 212 A. For small errors the direction itself is better, at switches
 /// above all.
 fn leaning(more_ticks: AlphaBeta) -> AlphaBeta {
@@ -72,8 +72,8 @@ pub(super) fn played(
     out
 }
 
-/// By how many ticks each phase is to be on for longer, where those with an `edge` can be: the volt-seconds themselves with two or three
-/// of them, with one the part of them that lies in its direction.
+/// Ticks by which each phase is to be on for longer, if it has an `edge`: with two or three such phases the volt-seconds themselves,
+/// with one the part of them that lies in its direction.
 fn longer(edge: [bool; 3], more_ticks: AlphaBeta) -> [f32; 3] {
     let more = more_ticks.abc();
     let [a, b, c] = [more.a, more.b, more.c];
@@ -87,7 +87,7 @@ fn longer(edge: [bool; 3], more_ticks: AlphaBeta) -> [f32; 3] {
 }
 
 impl Part {
-    /// Level at its end.
+    /// Level at the end of the half.
     pub fn ends_at(&self) -> bool {
         self.level ^ self.edge.is_some()
     }
@@ -260,8 +260,8 @@ mod tests {
         }
     }
 
-    /// By the flux of the pulses themselves over a turn, in steps of a fortieth of a half: the share of all of it within 12 %, that along the flux within 0.012 of
-    /// the fundamental, which 0.55 of all of it for every branch misses by up to 0.11.
+    /// By the flux of the pulses themselves over a turn, in steps of a fortieth of a half: the share of all ripple is within 12 %, that along the flux within
+    /// 0.012 of the fundamental; 0.55 of all ripple for every branch would miss the latter by up to 0.11.
     #[test]
     fn the_ripples_shares_are_those_of_the_pulses() {
         const STEPS: u32 = 40;

@@ -1,9 +1,9 @@
 //! Proofs of the choice of mode, by every cell of the arrangement of its borders.
 //!
 //! The choice compares the frequency and the modulation index with the ladder's borders, and looks at nothing else. So it is the same
-//! in a whole cell between the borders, and a few numbers stand for all of them: each border as the first number that is not
-//! below it, both its neighbours, one number between two borders, and all that is no ordinary number. Borders of the
-//! index that the shortest pulse lowers depend on the frequency: where two of them cross, the frequency has a border too.
+//! throughout a cell between the borders, and a few numbers stand for all of them: each border as the first number that is not
+//! below it, both its neighbours, one number between two borders, and all numbers that are not ordinary. Borders of the
+//! index that are lowered by the shortest pulse depend on the frequency: where two of them cross, the frequency has a border too.
 //!
 //! Each proof holds for pulses of any shortest length that [`SHORTEST`] brackets by examples.
 
@@ -20,7 +20,7 @@ const LINK_V: f32 = 1_500.0;
 /// Shortest pulses, in ticks: none, 10 µs, 40 µs.
 const SHORTEST: [u32; 3] = [0, 250, 1_000];
 
-/// Numbers that are no ordinary ones, and the ends of those that are.
+/// Numbers that are not ordinary, and the ends of those that are.
 const SPECIAL: [f32; 10] = [
     f32::NAN,
     f32::NEG_INFINITY,
@@ -86,7 +86,7 @@ impl Passed {
 struct Cell {
     share: Passed,
     index: Passed,
-    /// Of the modulation index that is made; `None` if that is no number.
+    /// That of the modulation index that is made; `None` if it is NaN.
     made: Option<Passed>,
 }
 
@@ -143,7 +143,7 @@ impl Case {
         modes
     }
 
-    /// Shares of the frequency's borders, up and down. The free carrier's is passed by what is no number, too.
+    /// Shares of the frequency's borders, up and down. NaN, too, passes the free carrier's.
     fn shares(&self) -> impl Iterator<Item = (f32, f32)> {
         self.ladder.modes().map(|mode| mode.row().until.shares)
     }
@@ -158,13 +158,13 @@ impl Case {
         share(&Reference { rate, ..Reference::NONE }, &self.devices)
     }
 
-    /// The index that is held against the borders: a floor that rises with the frequency lifts the one of optimised patterns.
+    /// The index compared with the borders: a floor that rises with the frequency lifts the one of optimised patterns.
     #[cfg(feature = "optimal")]
     fn index(&self, seen: &Reference) -> f32 {
         self.schedule().filled_index(seen, &self.devices)
     }
 
-    /// The index that is held against the borders.
+    /// The index compared with the borders.
     #[cfg(not(feature = "optimal"))]
     fn index(&self, seen: &Reference) -> f32 {
         seen.modulation_index
@@ -252,7 +252,7 @@ fn crossings([from, to]: [f32; 2], count: usize, sides: impl Fn(f32) -> Vec<f32>
     orders.filter_map(crosses).collect()
 }
 
-/// The index that is counted as made of a voltage: with the room that `wanted` gives it.
+/// The index that counts as made by a voltage: with the room that `wanted` gives it.
 fn made(voltage_v: f32) -> f32 {
     voltage_v / crate::frames::six_step_v(LINK_V) + 0.02
 }
@@ -272,12 +272,12 @@ struct Choice {
     cell: Cell,
     /// A reference in it.
     seen: Reference,
-    /// Of each mode, by its place, the one that is wanted.
+    /// For each mode, by its place, the one that is wanted.
     next: Vec<u8>,
 }
 
 impl Choice {
-    /// The mode at which the choice stays, and after how many switches.
+    /// The mode at which the choice stays, and the number of switches until then.
     fn settled(&self, mut mode: u8) -> (u8, u32) {
         for switches in 0..10 {
             let next = self.next[usize::from(mode)];
@@ -290,8 +290,8 @@ impl Choice {
     }
 }
 
-/// A mode that is wanted is on the ladder, and wanted still once it has come, by one switch, or by two: a free carrier gives way to a locked one, and that to a
-/// pattern; the first of the optimised patterns may give way where less voltage is made than the operating point asks for.
+/// A wanted mode is on the ladder, and is still wanted once it has come, by one switch or by two: a free carrier gives way to a locked one, and that to a
+/// pattern; the first of the optimised patterns may give way if less voltage is made than the operating point asks for.
 #[test]
 fn a_constant_input_ends_in_one_mode_of_the_ladder() {
     for (case, choices) in every_choice() {
@@ -313,7 +313,7 @@ fn a_constant_input_ends_in_one_mode_of_the_ladder() {
     }
 }
 
-/// Between two inputs that no border's whole hysteresis parts, to and fro as often as one likes: no mode that was left is taken again.
+/// Between two inputs that no border's whole hysteresis separates, back and forth any number of times: no mode that was left is taken again.
 #[test]
 fn no_mode_is_taken_again_within_the_hysteresis() {
     for (_, choices) in every_choice() {
@@ -333,7 +333,7 @@ fn no_mode_is_taken_again_within_the_hysteresis() {
     }
 }
 
-/// To and fro between two inputs, once the mode has settled at the first one.
+/// Back and forth between two inputs, once the mode has settled at the first one.
 fn to_and_fro(from: &Choice, to: &Choice, mode: u8) {
     let (mut mode, mut left, mut still) = (from.settled(mode).0, 0_u32, 0);
     let mut inputs = [to, from].into_iter().cycle();
@@ -366,7 +366,7 @@ fn more_of_either_never_leads_down() {
     }
 }
 
-/// For its dwell time a mode is kept, whatever comes, and no tick longer; also where the count of the ticks wraps, and where it has
+/// A mode is kept for its dwell time, whatever comes, and no tick longer; also if the count of the ticks wraps or has
 /// gone half round since. With gates off there is nothing to keep. A pattern does not wait below its smallest index.
 #[test]
 fn a_mode_is_kept_for_its_dwell_time_and_no_longer() {
@@ -375,7 +375,7 @@ fn a_mode_is_kept_for_its_dwell_time_and_no_longer() {
         assert_eq!(dwell_ticks, 750_000, "30 ms");
         let modes = case.modes();
         for choice in choices {
-            // The paper's modes do not go by what is made, but for this.
+            // The paper's modes do not depend on what is made, except here.
             let made_v = if case.is_optimal() { choice.seen.voltage_v } else { 900.0 };
             let seen = &Reference { voltage_v: made_v, ..choice.seen };
             for (mode, next) in modes.iter().zip(&choice.next) {
@@ -395,7 +395,7 @@ fn a_mode_is_kept_for_its_dwell_time_and_no_longer() {
                     let keeps = is_kept && !is_below(case, *mode, seen);
                     let wanted = if keeps { *mode } else { modes[usize::from(*next)] };
                     assert_eq!(found, wanted, "{mode:?} after {elapsed}: {seen:?}");
-                    // What has run out stays so, however far the ticks count on.
+                    // A time that has run out stays so, however far the ticks count on.
                     let again = schedule.wanted(last, *mode, seen, &case.devices);
                     assert!(keeps || again == modes[usize::from(*next)]);
                 }
@@ -404,7 +404,7 @@ fn a_mode_is_kept_for_its_dwell_time_and_no_longer() {
     }
 }
 
-/// `true` if less is made than a mode waits with: three quarters of six-step in a middle-60° pattern of the ladder.
+/// `true` if less is made than the voltage with which a mode waits: three quarters of six-step in a middle-60° pattern of the ladder.
 fn is_below(case: &Case, mode: Mode, seen: &Reference) -> bool {
     let is_low = seen.voltage_v < 0.75 * crate::frames::six_step_v(seen.udc_v);
     is_low && mode.is_pattern() && case.ladder.modes().any(|rung| rung == mode)
@@ -422,7 +422,7 @@ fn is_below_its_branch(mode: Mode, seen: &Reference) -> bool {
     mode.branch().is_some_and(|branch| made(seen.voltage_v) < branch.first)
 }
 
-/// Out of rest each input has a mode at once: the one that the lowest mode ends in, or of the optimised ladder one that can catch a
+/// Out of rest each input has a mode at once: the one that the lowest mode ends in, or for the optimised ladder one that can catch a
 /// machine.
 #[test]
 fn every_input_has_a_mode_to_begin_with() {
@@ -442,7 +442,7 @@ fn every_input_has_a_mode_to_begin_with() {
     }
 }
 
-/// Numbers that are none are in no mode's way: a frequency that is no number has passed no border but the free carrier's, an index that is none
+/// NaN is in no mode's way: a frequency that is NaN has passed no border but the free carrier's, an index that is NaN
 /// has passed none.
 #[test]
 fn what_is_no_number_counts_as_the_lowest_rung() {
@@ -467,7 +467,7 @@ fn what_is_no_number_counts_as_the_lowest_rung() {
     }
 }
 
-/// The largest fundamental of a mode: what notches of the shortest pulse leave of it, `1 − Σ sin(β/2)`, and for the others what their rows say.
+/// The largest fundamental of a mode: what notches of the shortest pulse leave of it, `1 − Σ sin(β/2)`, and for the others the value in their rows.
 #[test]
 fn the_shortest_pulse_takes_its_part_of_the_fundamental() {
     for (hz, min_pulse_ticks) in [(50.0, 250), (-120.0, 250), (200.0, 250), (300.0, 1_000), (300.0, 0)] {
@@ -485,7 +485,7 @@ fn the_shortest_pulse_takes_its_part_of_the_fundamental() {
     }
 }
 
-/// A pattern of the paper's ladder is kept for its dwell time at three quarters of six-step still, with less it is not.
+/// A pattern of the paper's ladder is still kept for its dwell time at three quarters of six-step; with less it is not.
 #[test]
 fn a_pattern_is_kept_down_to_three_quarters_of_six_step() {
     let case = Case::new(Ladder::PAPER, SHORTEST[1]);
@@ -504,7 +504,7 @@ fn a_pattern_is_kept_down_to_three_quarters_of_six_step() {
     }
 }
 
-/// At its smallest index an optimised pattern is kept for its dwell time still, at the next number below it is not.
+/// At its smallest index an optimised pattern is still kept for its dwell time; at the next number below it is not.
 #[cfg(feature = "optimal")]
 #[test]
 fn an_optimised_pattern_is_kept_down_to_its_smallest_index() {
