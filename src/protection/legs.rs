@@ -34,7 +34,7 @@ impl LegFaults {
     /// The safe state with such legs, in place of the one for sound legs.
     ///
     /// - A driver that blocks alone has found the other device of its leg conducting. The short circuit at that device's rail is then safe at every
-    ///   speed. With the gates off, this leg and the diodes of the others would rectify the EMF into a half-wave of several times the short circuit's
+    ///   speed. With the gates off, this leg and the diodes of the others would rectify the EMF into one half-wave of several times the short circuit's
     ///   current; at the other rail the machine would have the whole link across it.
     /// - A leg without both devices makes the short circuit asymmetric: gates off as long as the link withstands the EMF.
     /// - A leg without one of its devices takes part in the short circuit at the rail where it was seen.
