@@ -52,7 +52,7 @@ pub struct Setup {
     pub over_protocol: bool,
     /// `true` if nothing compensates the dead time.
     pub uncompensated: bool,
-    /// `true` if a line filter stands in front of the link and is to be damped.
+    /// `true` if a line filter stands in front of the link: it is to be damped.
     pub behind_line_filter: bool,
     /// Age of the angle that the drive is told, in s.
     pub angle_late_s: f32,

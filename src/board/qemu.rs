@@ -159,7 +159,7 @@ pub fn stop(success: bool) -> ! {
     }
 }
 
-/// Refuses to start: names the refused scalar and ends the emulation. No interrupt is unmasked, and the gates are off.
+/// Refuses to start: names what is refused and ends the emulation. No interrupt is unmasked, and the gates are off.
 pub fn refuse(refused: &Refused) -> ! {
     exchange::refused(refused.name);
     stop(false)

@@ -56,7 +56,7 @@ impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
         }
     }
 
-    /// Writer's side: the next value; `faulty` if a fault is latched.
+    /// Writer's side: the next value, with the flag of a latched fault.
     #[inline(always)]
     pub fn record(&self, value: T, faulty: bool) {
         let after = self.after.load(Ordering::Relaxed);

@@ -1,10 +1,10 @@
-//! The acknowledgement of a fault, which control and the PWM interrupt carry out together.
+//! The acknowledge of a fault, which control and the PWM interrupt carry out together.
 
 /// Control's side. The operator's number says that he has seen the fault. A release, which has its own number, makes the PWM interrupt forget its
 /// fault and leave the safe state. Control asks for a release only while it holds a fault, so never together with a command of pulses. While control
 /// holds no fault, the operator's number has nothing to forget, now or later.
 pub(super) struct Acknowledge {
-    /// Number of the last operator's acknowledgement that has been answered.
+    /// Number of the last operator's acknowledge that has been answered.
     answered: u8,
     /// Number of the last release that was requested from the PWM interrupt.
     release: u8,
@@ -42,7 +42,7 @@ impl Acknowledge {
         self.release = self.release.wrapping_add(u8::from(self.pending));
     }
 
-    /// Number of the operator's acknowledgement that both interrupts have carried out, or that had nothing to forget.
+    /// Number of the operator's acknowledge that both interrupts have carried out, or that had nothing to forget.
     pub(super) fn answered(&self) -> u8 {
         self.answered
     }

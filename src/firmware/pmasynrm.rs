@@ -1,5 +1,5 @@
-//! The PMaSynRM's two interrupts and its idle loop. The image's root chooses the `qemu` (the board, or the board with faults injected), the control
-//! law that its `law` names and the pulse patterns of its `patterns`.
+//! The PMaSynRM's two interrupts and its idle loop. The image's root names the `qemu` (the board, or the board with faults injected), by its `law`
+//! the control law, and by its `patterns` the pulse patterns.
 
 use crate::law::{self, Law};
 use crate::patterns;

@@ -1,5 +1,5 @@
-//! The ZS9's two interrupts and its idle loop. The image's root chooses the `qemu` (the board, or the board with faults injected) and the control law
-//! that its `law` names.
+//! The ZS9's two interrupts and its idle loop. The image's root names the `qemu` (the board, or the board with faults injected) and, by its `law`,
+//! the control law.
 
 use crate::law::{self, Law};
 use crate::qemu::{self, CLOCK, Interrupt as interrupt};

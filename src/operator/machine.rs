@@ -32,7 +32,7 @@ enum Phase {
     Discharge(Discharge),
     Fault {
         trip: Trip,
-        /// Slots since the acknowledgement was passed on; `None` before.
+        /// Slots since the acknowledge was passed on; `None` before.
         asked: Option<u32>,
     },
 }
@@ -48,7 +48,7 @@ pub struct Operator<D> {
     bad_values: Option<Refusal>,
     refusal: Option<Refusal>,
     refusals: u32,
-    /// Number of the last acknowledgement that was passed on.
+    /// Number of the last acknowledge that was passed on.
     acknowledge: u8,
     thermal: ThermalState,
     temperatures: Option<Temperatures>,
@@ -258,7 +258,7 @@ impl<D: Demands> Operator<D> {
         }
     }
 
-    /// The drive's answer to an acknowledgement: the cause is gone, or remains; without an answer the fault remains as well.
+    /// The drive's answer to an acknowledge: the cause is gone, or remains; without an answer the fault remains as well.
     fn await_release(&mut self, trip: Trip, waited_s: f32, input: &Situation) {
         let answered = input.observed.acknowledged == self.acknowledge;
         let again = match input.observed.trip {

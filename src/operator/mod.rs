@@ -1,7 +1,7 @@
 //! The permission to pulse: the state machine between those who command and the drive.
 //!
 //! init → self-test → ready → precharge → charged → enabled → running, with coasting, stopping, discharge and fault. Gates come on only by an
-//! explicit edge; a fault is left only by an acknowledgement, and only if its cause is gone; every command that is not followed has a reason.
+//! explicit edge; a fault is left only by an acknowledge, and only if its cause is gone; every command that is not followed has a reason.
 //!
 //! One pure step per slot of a millisecond, a whole number of control periods, in the idle loop: its input is the drive's report from the slot's
 //! beginning, and its decision holds from the next slot's beginning on ([`Mailboxes`](crate::drive::Mailboxes)). So it makes no difference when the
@@ -55,7 +55,7 @@ pub fn slot_s(clock: &Clock) -> f32 {
 
 /// Time for which everything must be in order during the self-test, in s.
 const SELF_TEST_S: f32 = 0.05;
-/// Longest time for both interrupts to carry out an acknowledgement, in s.
+/// Longest time for both interrupts to carry out an acknowledge, in s.
 const ACKNOWLEDGE_S: f32 = 0.05;
 
 /// The inputs of a step.

@@ -188,7 +188,7 @@ pub struct Seen {
     pub speed_known: bool,
     /// The fault that either side has latched.
     pub trip: Option<Trip>,
-    /// Number of the last acknowledgement that both sides have carried out.
+    /// Number of the last acknowledge that both sides have carried out.
     pub acknowledged: u8,
 }
 

@@ -197,7 +197,7 @@ impl<T: DemandWords> Status<T> {
         [codes, refusals, first, second, chopper.to_bits(), fault, value, limit, at]
     }
 
-    /// The inverse of [`Self::to_words`]; `None` for words that this drive does not make.
+    /// The inverse of [`Self::to_words`]; `None` for words that are not ours.
     pub fn from_words(words: [u32; 9]) -> Option<Self> {
         let [codes, refusals, first, second, chopper, trip @ ..] = words;
         let [state, refusal, flags, _] = codes.to_le_bytes();

@@ -1,4 +1,4 @@
-//! The limits of a train: the power that it may take from its line and give back, and its possible acceleration.
+//! The limits of a train: the current and the power that it may take from its line and give back, and how fast it can accelerate.
 
 use crate::cell::Words;
 

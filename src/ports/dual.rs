@@ -60,7 +60,7 @@ pub struct DualDriveCommand {
     pub link_ref_v: f32,
     /// The place of the zero vectors.
     pub scheme: Scheme,
-    /// Number of the operator's last acknowledgement.
+    /// Number of the operator's last acknowledge.
     pub acknowledge: u8,
 }
 

@@ -51,7 +51,7 @@ pub struct DriveCommand {
     pub demand: Demand,
     /// DC-link voltages at which torque is reduced to zero.
     pub window: LinkWindow,
-    /// Number of the operator's last acknowledgement: a new one, with the gates off, makes both interrupts forget their fault.
+    /// Number of the operator's last acknowledge: a new one, with the gates off, makes both interrupts forget their fault.
     pub acknowledge: u8,
     /// The warmth of the machine, if its temperatures are measured.
     pub warmth: Warmth,
@@ -126,7 +126,7 @@ pub trait ControlPort<S: System = Traction> {
     fn command(&mut self, _now: Instant, operator: impl FnOnce() -> S::Command) -> S::Command {
         operator()
     }
-    /// Puts the gates into the safe state at once, until an acknowledgement, whatever is being played. Gates off may become a short circuit later; a
+    /// Puts the gates into the safe state at once, until an acknowledge, whatever is being played. Gates off may become a short circuit later; a
     /// short circuit remains one, whatever either interrupt then orders.
     fn enter(&mut self, safe: SafeState, now: Instant);
     /// The number of ticks by which the interrupt, begun nominally at `now`, has exceeded `deadline_ticks`; 0 when in time.

@@ -31,7 +31,7 @@ pub struct Report {
     pub current_a: f32,
     /// `true` once the speed has been followed long enough to be used.
     pub speed_known: bool,
-    /// Number of the acknowledgement that both interrupts have carried out.
+    /// Number of the acknowledge that both interrupts have carried out.
     pub acknowledged: u8,
     /// Pulse pattern for which the voltage was made.
     pub mode: Mode,
@@ -116,7 +116,7 @@ pub struct DualReport {
     pub source_v: f32,
     /// `true` once both speeds have been followed long enough to be used.
     pub speed_known: bool,
-    /// Number of the acknowledgement that both interrupts have carried out.
+    /// Number of the acknowledge that both interrupts have carried out.
     pub acknowledged: u8,
 }
 

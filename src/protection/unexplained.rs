@@ -33,7 +33,7 @@ impl UnexplainedWatch {
     }
 
     /// A boundary has passed after a half of this many seconds, with an unexplained voltage, in V, rotor frame. A configured dead time may account
-    /// for up to the second argument of it, in V, from 0. The electrical speed is in rad/s.
+    /// for a part of it, at most the second argument, in V, from 0. The electrical speed is in rad/s.
     #[inline(always)]
     pub fn step(&mut self, unexplained_v: Dq, dead_v: f32, omega: f32, half_s: f32, tables: &Tables) {
         let ratings = &tables.ratings;

@@ -44,7 +44,7 @@ impl<D: MessageSet> CanEndpoint<D> {
         self.session.counts()
     }
 
-    /// The frame to send after the slot, if one is due; `report` is the drive's at the slot's beginning.
+    /// The frame to send after the slot, if one is due; the report is the drive's at the slot's beginning.
     pub fn tell(&mut self, status: &Status<DemandStatus<D>>, report: Option<&Report<D>>) -> Option<Frame> {
         let (measured, mode) = D::observed(report, status.temperatures.as_ref(), self.ratings);
         self.session.tell(&TelemetrySource { status, measured: &measured, mode })

@@ -66,7 +66,7 @@ pub struct Parameters {
     pub speed_limit_rpm: f32,
     /// Silence after which torque is zero, in ms.
     pub command_zero_ms: f32,
-    /// Silence after which the drive stops, in ms; counted from the same command as the other.
+    /// Silence after which the drive stops, in ms; counted from the same command as the one above.
     pub command_off_ms: f32,
     /// Largest line current while motoring, in A.
     pub line_current_motoring_a: f32,

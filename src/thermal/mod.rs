@@ -60,7 +60,8 @@ impl Thermal {
     }
 }
 
-/// Time for which a sensor must be wrong, or a part too hot, in s: far shorter than either needs to do harm, and longer than a disturbed conversion.
+/// Time for which a sensor must be wrong, or a part too hot, in s: far below the time that either takes, and longer than a disturbed conversion
+/// lasts.
 pub const PERSISTENCE_S: f32 = 0.01;
 
 /// The ratios of the voltage across each sensor to the voltage across sensor and series resistor together, in 65,536ths.

@@ -13,7 +13,7 @@ use crate::protection::{self, FailedCheck, Fault, FrozenWatch, UnexplainedWatch}
 /// Natural frequency of the speed tracker, in rad/s: the phase of the speed loop requires a fast one.
 pub const TRACKING_RAD_S: f32 = 4000.0;
 pub use crate::protection::INNOVATION_RAD;
-/// Time over which a change of the speed is limited, in s. It reveals a sensor that begins to count the other way when it turns too slowly for an
+/// Time over which a change of the speed is checked, in s. The check finds a sensor that begins to count the other way at a speed too low for an
 /// innovation.
 const SLOW_S: f32 = 5e-3;
 /// Change of an electrical angle in that time, in rad, below which it cannot be told from noise.
@@ -22,7 +22,7 @@ const LEAST_ASTRAY_RAD: f32 = 0.25;
 /// has at the angle, up to 1.155, and reports it.
 const LOOP_SHARE: f32 = 1.15;
 /// Part of the dead time's possible effect that remains although it is compensated: legs that exchange twice within it, and edges beside a
-/// shoot-through. With a fifth of it, as for legs of two gates, a told dead time of 2 µs costs 4 % of torque.
+/// shoot-through. With a fifth of it, as for legs of two gates, a configured dead time of 2 µs costs 4 % of torque.
 const LEFT_SHARE: f32 = 0.5;
 /// Share of the largest voltage available at every angle that the operating point may use; the rest is for regulation.
 const STEADY_SHARE: f32 = 0.98;

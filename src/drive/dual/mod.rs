@@ -10,7 +10,7 @@
 //! Logical execution time: control samples at a valley of the carrier, and its command may be used from the last peak before the next sample on. At
 //! that peak the PWM interrupt loads the carrier period that begins at the next valley. So a voltage acts one period after its sample, and lasts one
 //! period. Both interrupts select each other's words by their instants. At 20 kHz a control period holds two carrier periods: each command is played
-//! twice, with the vectors turned on for the second.
+//! twice, with the vectors turned further the second time.
 //!
 //! The modulator divides by the link voltage that the PWM interrupt measures, so a change of the link voltage hardly reaches the motors; the link's
 //! own control sees the motors' power before it is drawn.
@@ -41,7 +41,8 @@ pub use pwm::PwmTask;
 /// rounding alone would shake each motor's torque by some hundredths of a N·m.
 pub const COMPARE_STEPS: u32 = 32;
 
-/// Share of the nominal source's voltage above which the capacitors count as charged: at rest they have the source's voltage, which may be that low.
+/// Share of the nominal source's voltage from which on the capacitors count as charged: at rest they have the source's voltage, which may be that
+/// low.
 pub const LOWEST_SHARE: f32 = 0.9;
 
 /// Longest dead time that the gates' hardware may insert, in s.

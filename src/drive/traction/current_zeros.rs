@@ -132,7 +132,7 @@ mod tests {
         let (fault, value, limit) = zeros.begin(LARGEST_A).unwrap();
         assert_eq!((fault, limit), (Fault::CurrentOffset, 10.0));
         assert!((value - 10.5).abs() < 1e-4, "{value}");
-        // An acknowledgement and pulses at once, or after a short rest, change nothing; a rest without an offset does.
+        // An acknowledge and pulses at once, or after a short rest, change nothing; a rest without an offset does.
         assert!(zeros.begin(LARGEST_A).is_some());
         assert_eq!(zeros.without(SHOWN), SHOWN);
         (0..SETTLING).for_each(|_| zeros.rest(SHOWN));

@@ -74,7 +74,7 @@ impl Drops {
     }
 }
 
-/// Step of a count above which the tracker's angle is nearer to the rotor's than the sensor's own, in rad: half a degree.
+/// Step of a count from which on the tracker's angle is nearer to the rotor's than the sensor's own, in rad: half a degree.
 const COARSE_RAD: f32 = 8.727e-3;
 
 impl Settings {

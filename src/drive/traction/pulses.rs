@@ -353,7 +353,7 @@ mod tests {
         }
     }
 
-    /// Before the first boundary nobody knows for which boundaries; a half that is planned is not planned again.
+    /// Before the first boundary nobody knows for which boundaries halves are lacking; a half that is planned is not planned again.
     #[test]
     fn halves_are_lacking_from_the_first_boundary_on_until_they_are_planned() {
         let (history, cell) = (History::new(), Planned::new());

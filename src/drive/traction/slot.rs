@@ -8,7 +8,7 @@ use crate::time::{Clock, Instant};
 /// as the free carrier's do.
 const SERVES_PERIODS: u32 = 3;
 
-/// The same after a single half of less than two periods, which leaves no period for an operating point: longer by about such a half.
+/// The same after a single half of less than two periods, which leaves no period for an operating point: longer by such a half.
 const LATE_SERVES_PERIODS: u32 = SERVES_PERIODS + 2;
 
 /// The decision at a boundary: the mode of the half that begins at the boundary after it.
@@ -30,7 +30,7 @@ impl Decision {
 
     /// `true` for a pattern's last half before another, which leads to that one's operating point; always for an optimised pattern. A pattern of
     /// whole edges that gives way to more carriers leaves the transition to them: otherwise its zero vector would last so much longer, and at a third
-    /// to half of the torque and 1,800 V this takes 45 N·m beyond its ripple.
+    /// to half of the torque and 1,800 V this would take 45 N·m beyond its ripple.
     pub const fn leads(&self) -> bool {
         let Self { mode, after, .. } = self;
         let of_edges = mode.is_pattern() && after.is_pattern() && after.carriers() < mode.carriers();

@@ -76,7 +76,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             .or_else(|| protection::check_demand(&command.demand))
     }
 
-    /// The failed check, or `None` if it is switched off.
+    /// The failed check, unless it is switched off.
     pub(super) fn armed(&self, failed: Option<FailedCheck>) -> Option<FailedCheck> {
         failed.filter(|(fault, _, _)| !self.masked.has(*fault))
     }
