@@ -1,6 +1,6 @@
-//! The tables of the machines that were chosen when this crate was built, `TRACTIVE_MACHINE` and `TRACTIVE_ZS9_MACHINE`: those of
-//! the two papers unless the environment names others. For the reference images, tests and examples; a firmware of one's own makes
-//! its tables in its own build script, with `tractive-tablegen`.
+//! The tables of the machines chosen when this crate was built, by `TRACTIVE_MACHINE` and `TRACTIVE_ZS9_MACHINE`: those of the two papers unless the
+//! environment names others. They are for the reference images, tests and examples; a firmware of one's own makes its tables in its own build script,
+//! with `tractive-tablegen`.
 
 #![forbid(unsafe_code)]
 

@@ -1,16 +1,15 @@
 //! The cells between the two interrupts: one type per priority direction.
 //!
-//! All are arrays of 32-bit atomics with relaxed loads and stores (plain `ldr`/`str` on the target), so a value
-//! can be stale but never undefined, and nothing here needs `unsafe`. One core; the higher-priority interrupt
-//! preempts the lower one and runs to completion: so on the target what each period uses is ordered by the
-//! compiler alone; the sequence counter, which is used seldom, has fences.
+//! All are arrays of 32-bit atomics with relaxed loads and stores (plain `ldr`/`str` on the target), so a value can be stale but never undefined, and
+//! nothing here needs `unsafe`. There is one core, and the higher-priority interrupt preempts the lower one and runs to completion. So on the target
+//! the compiler alone orders the accesses of each period; the sequence counter, which is seldom used, has fences.
 //!
-//! * [`Mailbox`], low → high: a double buffer, or one of more slots. The reader is wait-free because the writer cannot run while
-//!   it reads, and never sees a half-written value because the writer fills the slot that nobody reads.
-//! * [`History`], high → low: a ring of records. The writer is wait-free and writes each record once; the reader looks at the last
-//!   few where they lie, and the writer cannot come round to them while it does.
-//! * [`Seqlock`], high → low: a sequence counter. The writer is wait-free; the reader tries again when a write
-//!   came in between, a bounded number of times (a second write within one read takes a carrier half).
+//! * [`Mailbox`], low → high: a double buffer, or one of more slots. The reader is wait-free because the writer cannot run while it reads, and it
+//!   never sees a half-written value because the writer fills the slot that nobody reads.
+//! * [`History`], high → low: a ring of records. The writer is wait-free and writes each record once; the reader reads the last few in place, and the
+//!   writer cannot come round to them meanwhile.
+//! * [`Seqlock`], high → low: a sequence counter. The writer is wait-free; the reader tries again if a write came in between, a bounded number of
+//!   times (a second write within one read takes a carrier half).
 //! * [`Ring`], one interrupt → anybody, afterwards: the flight recorder's memory, read only once a fault has frozen it.
 
 #![forbid(unsafe_code)]
@@ -33,7 +32,7 @@ use core::sync::atomic::{AtomicU32, Ordering, fence};
 pub trait Words<const N: usize>: Copy {
     /// The value as words.
     fn to_words(self) -> [u32; N];
-    /// The value from what [`Words::to_words`] made.
+    /// The value from the words that [`Words::to_words`] made.
     fn from_words(words: [u32; N]) -> Self;
 }
 
@@ -53,7 +52,7 @@ fn load<const N: usize>(slot: &[AtomicU32; N]) -> [u32; N] {
     words
 }
 
-/// A word, and with it all that was stored before it was.
+/// Loads a word, and with it all that was stored before it.
 #[inline(always)]
 fn acquire(word: &AtomicU32) -> u32 {
     let value = word.load(Ordering::Relaxed);
@@ -61,7 +60,7 @@ fn acquire(word: &AtomicU32) -> u32 {
     value
 }
 
-/// Stores a word behind all that was stored before.
+/// Stores a word after all that was stored before.
 #[inline(always)]
 fn release(word: &AtomicU32, value: u32) {
     order(Ordering::Release);
@@ -70,10 +69,10 @@ fn release(word: &AtomicU32, value: u32) {
 
 /// From the low-priority interrupt (writer) to the high-priority one (reader).
 ///
-/// It holds the newest values, two unless more are asked for (a power of two), so that the reader can pick by a rule that does not depend
-/// on when the writer happened to finish: the newest one that is `ready`. The oldest slot is rewritten only by the next
-/// [`Mailbox::publish`]; a writer that publishes only once no reader wants that one any more (of two values: once its previous value is
-/// `ready` for every reader, one control period later by construction) never has the slot in use rewritten.
+/// It holds the newest values, two unless more are requested (a power of two), so that the reader can choose by a rule that does not depend on when
+/// the writer happened to finish: the newest value that is `ready`. Only the next [`Mailbox::publish`] rewrites the oldest slot. If a writer
+/// publishes only once no reader needs that slot any more (with two values: once its previous value is `ready` for every reader, one control period
+/// later by construction), the slot in use is never rewritten.
 pub struct Mailbox<T, const N: usize, const SLOTS: usize = 2> {
     slots: [[AtomicU32; N]; SLOTS],
     /// Counts the values published, 0 before the first; the newest is in slot `published % SLOTS`.
@@ -112,7 +111,7 @@ impl<T: Words<N>, const N: usize, const SLOTS: usize> Mailbox<T, N, SLOTS> {
             0 => SLOTS as u32,
             count => count,
         };
-        // Not before the value before it is told.
+        // Not before the previous value has been made known.
         order(Ordering::Release);
         store(self.slot(next), value.to_words());
         release(&self.published, next);
@@ -124,7 +123,7 @@ impl<T: Words<N>, const N: usize, const SLOTS: usize> Mailbox<T, N, SLOTS> {
         self.find(ready).map(|record| T::from_words(load(record.0)))
     }
 
-    /// The same where it lies.
+    /// The same, in place.
     #[inline]
     pub fn find(&self, ready: impl Fn(&Record<N>) -> bool) -> Option<Record<'_, N>> {
         let published = acquire(&self.published);
@@ -140,7 +139,7 @@ impl<T: Words<N>, const N: usize, const SLOTS: usize> Mailbox<T, N, SLOTS> {
         None
     }
 
-    /// Reader's side: the newest value where it lies, ready or not.
+    /// Reader's side: the newest value in place, ready or not.
     #[inline]
     pub fn last(&self) -> Option<Record<'_, N>> {
         match acquire(&self.published) {
@@ -155,7 +154,7 @@ impl<T: Words<N>, const N: usize, const SLOTS: usize> Mailbox<T, N, SLOTS> {
     }
 }
 
-/// Counts a try that a write has overtaken; says whether there is another one. Out of line: so a read is there once, not once a try.
+/// Counts a try that a write has overtaken; true if another try remains. Out of line: so the read exists once, not once per try.
 #[cold]
 #[inline(never)]
 fn overtaken(tries: &mut usize) -> bool {
@@ -169,7 +168,7 @@ const READ_TRIES: usize = 3;
 
 /// From the high-priority interrupt (writer) to the low-priority one (reader).
 pub struct Seqlock<T, const N: usize> {
-    /// Odd while a write is under way.
+    /// The sequence count, odd while a write is under way.
     sequence: AtomicU32,
     words: [AtomicU32; N],
     value: core::marker::PhantomData<fn(T) -> T>,
@@ -236,19 +235,19 @@ const RECORDS: usize = 8;
 
 /// From the high-priority interrupt (writer) to the low-priority one (reader): the last records of `N` words.
 ///
-/// The reader finds the record that it wants by what stands in it, then reads that one and those before it as often as it likes. A new
-/// record goes into the oldest of the ring: a read is good until that is one of those that were read, which is noticed.
+/// The reader finds the wanted record by its content, then reads that one and those before it as often as it likes. A new record overwrites the
+/// oldest of the ring: a read is valid until that happens to one of the records read, which is detected.
 pub struct History<const N: usize> {
     records: [[AtomicU32; N]; RECORDS],
     /// Counts the records, 0 before the first; record n is in place `n % RECORDS`.
     published: AtomicU32,
 }
 
-/// The number of a record, counted on past the ring's end.
+/// The number of a record; the count continues past the ring's end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place(u32);
 
-/// A record where it lies: each word is loaded when it is asked for. Zeros where nothing was published yet.
+/// A record in place: each word is loaded when it is asked for. Zeros if nothing was published yet.
 #[derive(Clone, Copy)]
 pub struct Record<'a, const N: usize>(&'a [AtomicU32; N]);
 
@@ -299,7 +298,7 @@ impl<const N: usize> History<N> {
         acquire(&self.published) == place.0.wrapping_add(1)
     }
 
-    /// Reader's side: the newest record of the last `within` that `fits`; `None` if there is none.
+    /// Reader's side: the newest of the last `within` records that `fits`; `None` if there is none.
     #[inline(always)]
     pub fn find(&self, within: u32, fits: impl Fn(Record<N>) -> bool) -> Option<Place> {
         let published = acquire(&self.published);
@@ -313,8 +312,8 @@ impl<const N: usize> History<N> {
         None
     }
 
-    /// Reader's side: what `look` makes of the record at a place and of those before it, the newest first; `None` when writes have come round
-    /// to one of them, or the count has wrapped since the place was found, once in 2³² records.
+    /// Reader's side: the result of `look` for the record at a place and those before it, the newest first; `None` if writes have come round to one
+    /// of them, or if the count has wrapped since the place was found, once in 2³² records.
     #[inline]
     pub fn read<const COUNT: usize, R>(
         &self,
@@ -324,12 +323,12 @@ impl<const N: usize> History<N> {
         const { assert!(COUNT < RECORDS) };
         let seen = look(core::array::from_fn(|back| self.record(place, back as u32)));
         order(Ordering::Acquire);
-        // The record that is being written now is the oldest of the ring.
+        // The record being written now is the oldest of the ring.
         let written = self.published.load(Ordering::Relaxed).wrapping_sub(place.0);
         (written <= (RECORDS - COUNT) as u32).then_some(seen)
     }
 
-    /// The record so many before a place. The count wraps by whole rings.
+    /// The record this many places before a place. The count wraps by whole rings.
     #[inline(always)]
     fn record(&self, place: Place, back: u32) -> Record<'_, N> {
         Record(&self.records[place.0.wrapping_sub(back) as usize % RECORDS])
@@ -353,13 +352,13 @@ mod tests {
         }
     }
 
-    /// Both counts skip 0, which means "none yet", and keep to the order of the slots.
+    /// Both counts skip 0, which means "none yet", and keep the order of the slots.
     #[test]
     fn the_counts_wrap_without_a_gap() {
         let (down, up) = (Mailbox::<u32, 1>::new(), Seqlock::<u32, 1>::new());
         for n in 1..10 {
             if n == 4 {
-                // As after 2³² publications, less a few; each count in step with what it has come from.
+                // As after 2³² publications, less a few; each count in step with the previous one.
                 down.published
                     .store(down.published.load(Ordering::Relaxed).wrapping_sub(6), Ordering::Relaxed);
                 up.sequence.store(0_u32.wrapping_sub(6), Ordering::Relaxed);
@@ -408,7 +407,7 @@ mod tests {
         (0..100).chain(u32::MAX - 100..=u32::MAX)
     }
 
-    /// The values of a mailbox, from the newest back; `None` where there is none.
+    /// The values of a mailbox, from the newest back; `None` if there is none.
     fn values<const SLOTS: usize>(cell: &Mailbox<u32, 1, SLOTS>) -> Vec<Option<u32>> {
         (0..SLOTS)
             .map(|back| {
@@ -432,7 +431,7 @@ mod tests {
                 let known = values(&cell);
                 cell.publish(number as u32);
                 let now = values(&cell);
-                // The new one, then all that were there, but for the oldest.
+                // The new one, then all that were there, except the oldest.
                 assert_eq!(now[0], Some(number as u32), "{count}");
                 assert_eq!(now[1..], known[..SLOTS - 1], "{count}");
                 assert_eq!(cell.last().map(|record| record.word::<0>()), now[0]);
@@ -449,7 +448,7 @@ mod tests {
         every_slot_is_kept::<32>();
     }
 
-    /// The records that are read from a history as it stood, after some more have come.
+    /// The records read from a history as it stood, after this many more have come.
     fn read<const COUNT: usize>(later: u32, from: u32) -> Option<[u32; COUNT]> {
         let trail = History::<1>::new();
         trail.published.store(from, Ordering::Relaxed);
@@ -463,7 +462,7 @@ mod tests {
 
     fn every_read_is_whole<const COUNT: usize>() {
         for (later, from) in (0..12).flat_map(|later| counts().map(move |from| (later, from))) {
-            // The next record would go into the place of the oldest that was read: from then on nothing is told.
+            // The next record would overwrite the oldest of those read: from then on nothing is returned.
             let kept = later as usize + COUNT < RECORDS;
             let newest_first = core::array::from_fn(|back| 7 - back as u32);
             let counted = u64::from(from) + 8;
@@ -481,7 +480,7 @@ mod tests {
         every_read_is_whole::<7>();
     }
 
-    /// Record `within` back is the last one that is looked for, and none is there before the first.
+    /// Record `within` back is the last one that is searched, and none is there before the first.
     #[test]
     fn a_history_is_searched_as_far_as_it_is_told() {
         for from in counts() {

@@ -1,7 +1,7 @@
-//! An identification's memory: its observations in RAM as they come, and the frames that carry them off once it is over.
+//! An identification's memory: its observations in RAM as they come, and the frames that send them once the experiment is over.
 //!
-//! Control observes faster than a bus can carry, so what it observes is kept, [`PACKED_WORDS`] words each, and told in the slots that the
-//! drive's telemetry leaves free: over and over, so that a frame that is lost comes again.
+//! Control observes faster than a bus can carry. So the observations are kept, [`PACKED_WORDS`] words each, and sent in the slots that the drive's
+//! telemetry leaves free, over and over, so that a lost frame comes again.
 
 #![forbid(unsafe_code)]
 
@@ -13,21 +13,21 @@ use core::sync::atomic::{AtomicU32, Ordering};
 /// Observations that the longest experiment makes: 82 KB of RAM.
 pub const OBSERVATIONS: usize = 6_800;
 
-/// The observations of the last experiment. One interrupt writes; anybody reads what is counted.
+/// The observations of the last experiment. One interrupt writes; anybody may read the counted ones.
 pub struct Memory<const N: usize = OBSERVATIONS> {
     words: [[AtomicU32; PACKED_WORDS]; N],
     count: AtomicU32,
-    /// The stage of the newest, from 1 on; 0 before the first.
+    /// The stage of the newest observation, from 1 on; 0 before the first.
     stage: AtomicU32,
     /// Stage and count as they were when the slot began.
     shown: AtomicU32,
 }
 
-/// Place of the stage in what is shown, above the count.
+/// Position of the stage in the shown word, above the count.
 const SHOWN_STAGE: u32 = 16;
 
 impl<const N: usize> Memory<N> {
-    /// Before the first experiment.
+    /// The state before the first experiment.
     #[allow(clippy::declare_interior_mutable_const, reason = "an array initialiser, never borrowed")]
     pub const fn new() -> Self {
         Self {
@@ -38,8 +38,8 @@ impl<const N: usize> Memory<N> {
         }
     }
 
-    /// Control's side, at the end of each period: keeps the newest observation, if there is one, and shows what holds now where the period
-    /// begins a slot.
+    /// Control's side, at the end of each period: keeps the newest observation, if there is one, and updates the shown state if the period begins a
+    /// slot.
     pub fn take(&self, newest: Option<&Observation>, units: &Units, begins_slot: bool) {
         if let Some(observation) = newest {
             self.keep(observation, units);
@@ -49,8 +49,8 @@ impl<const N: usize> Memory<N> {
         }
     }
 
-    /// Keeps an observation. The first of an experiment takes the place of the experiment before; of the end's there is
-    /// one, and what finds no room is left out.
+    /// Keeps an observation. The first one of an experiment replaces the experiment before; only one of the end is kept, and observations that find
+    /// no room are dropped.
     fn keep(&self, observation: &Observation, units: &Units) {
         let before = stage_of(self.stage.load(Ordering::Relaxed));
         let begins = observation.stage == Stage::Probe && before != Stage::Probe;
@@ -68,13 +68,13 @@ impl<const N: usize> Memory<N> {
         self.stage.store(observation.stage as u32 + 1, Ordering::Release);
     }
 
-    /// Shows what holds now: that is told in the slot, whenever the idle loop runs.
+    /// Shows the present state: it is the one sent in the slot, whenever the idle loop runs.
     fn show(&self) {
         let count = self.count.load(Ordering::Relaxed);
         self.shown.store(self.stage.load(Ordering::Relaxed) << SHOWN_STAGE | count, Ordering::Release);
     }
 
-    /// The part of the experiment and the observations so far, as they were when the slot began.
+    /// The stage of the experiment and the number of observations so far, as they were when the slot began.
     pub fn told(&self) -> ExperimentFrame {
         let shown = self.shown.load(Ordering::Acquire);
         ExperimentFrame { stage: stage_of(shown >> SHOWN_STAGE), observations: shown as u16 }
@@ -87,7 +87,7 @@ impl<const N: usize> Memory<N> {
     }
 }
 
-/// The stage that is kept as its place from 1 on; [`Stage::Done`] before the first.
+/// The stage from the kept number, its position from 1 on; [`Stage::Done`] before the first.
 fn stage_of(kept: u32) -> Stage {
     let stage = kept.checked_sub(1).and_then(|place| Stage::ALL.get(place as usize));
     stage.copied().unwrap_or(Stage::Done)
@@ -96,7 +96,7 @@ fn stage_of(kept: u32) -> Stage {
 /// Calls between two frames of progress.
 const PROGRESS_CALLS: u32 = 32;
 
-/// The sender of what a [`Memory`] holds, in the slots that nothing else is sent in.
+/// The sender of the contents of a [`Memory`], in the slots in which nothing else is sent.
 #[derive(Clone, Copy, Debug)]
 pub struct Teller {
     counters: [Counter; 2],
@@ -106,7 +106,7 @@ pub struct Teller {
 }
 
 impl Teller {
-    /// At power-up.
+    /// The state at power-up.
     pub const fn new() -> Self {
         Self { counters: [Counter::new(); 2], calls: 0, index: 0, part: 0 }
     }
@@ -155,7 +155,7 @@ mod tests {
         }
     }
 
-    /// Currents that so many frames tell, by their observations' numbers.
+    /// Currents that this many frames carry, by their observations' numbers.
     fn told(teller: &mut Teller, memory: &Memory<4>, units: &Units, frames: u32) -> [Option<f32>; 4] {
         memory.show();
         let mut words = [[None; PACKED_WORDS]; 4];
@@ -192,7 +192,7 @@ mod tests {
             }
             assert_eq!(found[3], None);
         }
-        // The next experiment takes its place, and what finds no room is left out.
+        // The next experiment replaces it, and observations that find no room are dropped.
         (0..6).for_each(|k| memory.keep(&observation(Stage::Probe, 10.0 + k as f32), &units));
         memory.keep(&observation(Stage::Done, 99.0), &units);
         memory.show();

@@ -1,18 +1,19 @@
 //! `tractive`: the controller of a railway traction inverter.
 //!
-//! A timer interrupt decides which voltage ([`control`]) and, with time to spare, which pulses ([`modulation`] for two-level inverters), a PWM
-//! interrupt of higher priority loads them ([`nine_switch`], for the inverter that feeds two motors, is computed there), lock-free cells carry the few words between them ([`cell`]), a
-//! board gives samples and takes pulses ([`ports`]), and a rig on the host plays the motor. [`drive`] puts them together, once for
-//! each system ([`drive::traction`], [`drive::dual`]): its tasks are what the two interrupts call, on any board and on the host.
-//! [`machine`] has the types of the tables made offline, [`protection`] the faults and the safe state, [`recorder`] what led to one.
-//! [`operator`] switches the drive on and off, by [`thermal`] with less torque where it is hot, [`protocol`] is how it is asked over CAN, [`experiment`] what an identification keeps for it.
+//! A timer interrupt decides which voltage to apply ([`control`]) and, with time to spare, which pulses make it ([`modulation`], for two-level
+//! inverters). A PWM interrupt of higher priority loads the pulses; for the inverter that feeds two motors it also computes them ([`nine_switch`]).
+//! Lock-free cells carry the few words between the interrupts ([`cell`]). A board supplies samples and takes pulses ([`ports`]); a rig on the host
+//! plays the motor. [`drive`] puts the parts together, once for each system ([`drive::traction`], [`drive::dual`]): its tasks are what the two
+//! interrupts call, on any board and on the host. [`machine`] has the types of the tables made offline, [`protection`] the faults and the safe state,
+//! [`recorder`] the events that led to a fault. [`operator`] switches the drive on and off and, by [`thermal`], reduces its torque when it is hot;
+//! [`protocol`] carries requests to it over CAN; [`experiment`] is what an identification keeps for it.
 //!
-//! [`control`], [`identification`], [`start_up`], [`modulation`], [`nine_switch`], [`machine`], [`frames`] and [`time`](mod@time) are those of the crate
-//! `tractive-control`, which is usable alone. Neither control nor modulation knows the cells; only the drive knows all of them;
-//! only a board knows registers.
+//! [`control`], [`identification`], [`start_up`], [`modulation`], [`nine_switch`], [`machine`], [`frames`] and [`time`](mod@time) come from the crate
+//! `tractive-control`, which can be used alone. Neither control nor modulation knows the cells; only the drive knows all of them; only a board knows
+//! registers.
 //!
 //! # Features
-//! None is on by default, and without one there is no build script's work, no table, no vector, no linker file.
+//! None is on by default. Without any feature there is no build-script work, no table, no vector and no linker file.
 //!
 //! | feature | what it brings |
 //! |---|---|
@@ -24,9 +25,9 @@
 //! | `qemu` | what the reference images on QEMU's board need; with the two above |
 //!
 //! # Conventions
-//! * Pure steps: `step(&input, &mut state) -> output`; no clock, no peripheral, no global inside.
+//! * Pure steps: `step(&input, &mut state) -> output`, without a clock, a peripheral or a global inside.
 //! * SI units, with the unit in the name where a type does not say it (`udc_v`, `period_ticks`).
-//! * d along the magnet flux, L_d < L_q; amplitude-invariant transforms, peak values, electrical angles and speeds.
+//! * The d axis is along the magnet flux, L_d < L_q; transforms are amplitude-invariant, with peak values, electrical angles and electrical speeds.
 //!   Motoring forward: i_d < 0, i_q > 0.
 //! * f32 only; no heap; nothing in an interrupt panics, locks, or loops without a bound.
 //! * A value that is not finite ends in a named fault, never in an integrator.

@@ -1,7 +1,7 @@
 //! The flight recorder: the last control periods, frozen by a fault.
 //!
-//! Every control period writes one [`Record`] into a ring in RAM, whatever the drive does. A fault lets an eighth of the ring pass
-//! and stops it: what led to the fault is there to be read, until the ring is released.
+//! Every control period writes one [`Record`] into a ring in RAM, whatever the drive does. After a fault the ring takes an eighth of its length more
+//! and stops: the periods that led to the fault can then be read until the ring is released.
 
 #![forbid(unsafe_code)]
 
@@ -18,7 +18,7 @@ pub const RECORDS: usize = 256;
 /// Words of a record.
 pub const RECORD_WORDS: usize = 10;
 
-/// The ring, for a static of its own: whoever reads it needs nothing else.
+/// The ring, for a static of its own: a reader needs nothing else.
 pub type Recorder = Ring<Record, RECORD_WORDS, RECORDS>;
 
 /// One control period.

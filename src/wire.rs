@@ -1,8 +1,8 @@
 //! The words that a board in an emulator exchanges with the rig: fixed blocks of 16 words, little-endian.
 //!
-//! The firmware asks, the rig answers, at no virtual time. Requests of both interrupts share one stream, because each
-//! block is written whole; answers come on one stream per interrupt, because one interrupt may ask while the other
-//! still waits. Instants are the timers' nominal ones, never arrival times.
+//! The firmware asks, the rig answers, and this takes no virtual time. Requests of both interrupts share one stream, because each block is written
+//! whole. Answers have one stream per interrupt, because one interrupt may ask while the other still waits. Instants are the timers' nominal ones,
+//! never arrival times.
 
 #![forbid(unsafe_code)]
 
@@ -35,7 +35,7 @@ pub const BLOCK_BYTES: usize = BLOCK_WORDS * 4;
 /// One block.
 pub type Block = [u32; BLOCK_WORDS];
 
-/// The timers' and the inverter's values that the rig tells before anything starts.
+/// The timers' and the inverter's values that the rig sends before anything starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     /// Control period, in ticks.
@@ -44,29 +44,29 @@ pub struct Setup {
     pub min_pulse_ticks: u32,
     /// Dead time, in ticks.
     pub dead_time_ticks: u32,
-    /// By how much the PWM timer's first half is longer than the shortest one, in ticks.
+    /// Length of the PWM timer's first half beyond the shortest one, in ticks.
     pub pwm_delay_ticks: u32,
     /// The line side that the operator switches; `None`: no operator, the rig commands the drive directly.
     pub line: Option<LineTimes>,
-    /// `true` if the operator is asked over the protocol, by frames, and not by the words of the answers.
+    /// `true` if the operator's request comes over the protocol, in frames, and not in the words of the answers.
     pub over_protocol: bool,
     /// `true` if nothing compensates the dead time.
     pub uncompensated: bool,
-    /// A line filter stands in front of the link: it is to be damped.
+    /// `true` if a line filter stands in front of the link: it is to be damped.
     pub behind_line_filter: bool,
-    /// Age of the angle that the drive knows of, in s.
+    /// Age of the angle that the drive is told, in s.
     pub angle_late_s: f32,
     /// Step of a count of the angle, electrical, in rad; 0: none.
     pub angle_step_rad: f32,
-    /// Time constant of the current sensors that the drive knows of, in ticks, below 2¹⁶.
+    /// Time constant of the current sensors that the drive is told, in ticks, below 2¹⁶.
     pub current_filter_ticks: u32,
-    /// Threshold of the devices that the drive knows of, in mV, below 2¹⁵.
+    /// Threshold of the devices that the drive is told, in mV, below 2¹⁵.
     pub threshold_mv: u32,
     /// Their slope, in hundredths of a mΩ, below 2¹⁴.
     pub slope_10uohm: u32,
-    /// The share of the machine's iron loss that the drive makes up for, in thousandths.
+    /// The share of the machine's iron loss that the drive compensates, in thousandths.
     pub iron_permille: u32,
-    /// The operator's limits of line and acceleration; over the protocol the parameters hold.
+    /// The operator's limits of line and acceleration; over the protocol the parameters apply.
     pub train: TrainLimits,
 }
 
@@ -89,21 +89,21 @@ pub enum Request {
     Leave(Instant),
     /// The question for the operator's request and the board's feedback, in the slot that began at the instant.
     Ask(Instant),
-    /// The operator's status, and the frame that carries it; both from the instant on.
+    /// The operator's status, and the frame that carries it; both hold from the instant on.
     Tell(Instant, Status, Option<Frame>),
     /// The processor has stopped in a panic or a HardFault, gates off.
     Dead,
-    /// A control period from the flight recorder, the oldest first; after the last answer, if a fault has frozen it.
+    /// A control period from the flight recorder, the oldest first; sent after the last answer, if a fault has frozen it.
     Recorded(Record),
-    /// The image has nothing more to say.
+    /// The image has nothing more to send.
     End,
-    /// The observation of an identification, told by the control interrupt that began at the instant.
+    /// The observation of an identification, sent by the control interrupt that began at the instant.
     Observed(Instant, Observation),
     /// The electrical angle where the position sensor began to count, found by the control interrupt that began at the instant.
     Align(Instant, Angle),
 }
 
-/// A request's block. Not in every caller: images are small.
+/// A request's block. Out of line, not in every caller: images are small.
 #[inline(never)]
 fn block(tag: u32, at: Instant, payload: &[u32]) -> Block {
     filled([tag, at.0].into_iter().chain(payload.iter().copied()))
@@ -140,7 +140,7 @@ impl Request {
         }
     }
 
-    /// From a block; `None` if it is none of ours.
+    /// From a block; `None` if it is not one of ours.
     pub fn from_block(block: &Block) -> Option<Self> {
         let [tag, at, payload @ ..] = *block;
         let (at, [first, ..]) = (Instant(at), payload);
@@ -168,12 +168,12 @@ impl Request {
 }
 
 impl Setup {
-    /// The share of the machine's iron loss that the drive makes up for.
+    /// The share of the machine's iron loss that the drive compensates.
     pub fn iron_share(&self) -> f32 {
         1e-3 * self.iron_permille as f32
     }
 
-    /// The devices' drops that the drive knows of.
+    /// The devices' drops that the drive is told.
     pub fn drops(&self) -> Drops {
         Drops { threshold_v: 1e-3 * self.threshold_mv as f32, slope_ohm: 1e-5 * self.slope_10uohm as f32 }
     }
@@ -194,7 +194,7 @@ pub fn setup_to_block(setup: Setup) -> Block {
     filled(ticks.into_iter().chain(line).chain(more).chain(setup.train.to_words()))
 }
 
-/// The same, with where MTPA starts, for the image with the papers' ordinary law.
+/// The same block with the start of MTPA, for the image with the papers' ordinary law.
 pub fn setup_with_start(setup: Setup, start: MtpaStart) -> Block {
     let mut block = setup_to_block(setup);
     let [.., last] = &mut block;
@@ -217,7 +217,7 @@ fn line_from_words([present, precharge, discharge]: [u32; 3]) -> Option<LineTime
     (present & 1 == 1).then_some(times)
 }
 
-/// A status and a frame, one after the other.
+/// A status followed by a frame.
 fn told_to_words<T: DemandWords>(status: &Status<T>, frame: Option<Frame>) -> [u32; 12] {
     let [a, b, c, d, e, f, g, h, i] = status.to_words();
     let [head, low, high] = frame.to_words();
@@ -259,7 +259,7 @@ pub fn setup_from_block(block: &Block) -> Setup {
     }
 }
 
-/// The answer to [`Request::ControlSample`], with the rig's command, and what a sensor without an angle has counted; `stop` ends the run.
+/// The answer to [`Request::ControlSample`], with the rig's command and the count of a sensor without an angle; `stop` ends the run.
 pub fn sample_to_block(sample: &Sample, command: &DriveCommand, counted: Option<Angle>, stop: bool) -> Block {
     let enable = sample.may_pulse && command.enable;
     let flags = u32::from(enable) | u32::from(command.demand.slew_limited) << 1 | u32::from(stop) << 2;
@@ -272,7 +272,7 @@ pub fn sample_to_block(sample: &Sample, command: &DriveCommand, counted: Option<
     [a, b, c, sample.udc_v.to_bits(), angle, torque, flags, hardware, 0, 0, 0, 0, 0, 0, 0, 0]
 }
 
-/// The inverse of [`sample_to_block`], the command and what was counted as their words.
+/// The inverse of [`sample_to_block`], with the command and the count as their words.
 pub fn sample_from_block(block: &Block) -> (Sample, [u32; 3], bool) {
     let [a, b, c, udc, angle, torque, flags, hardware, ..] = *block;
     let sample = Sample {
@@ -285,12 +285,12 @@ pub fn sample_from_block(block: &Block) -> (Sample, [u32; 3], bool) {
     (sample, [torque, flags, angle], flags & 4 != 0)
 }
 
-/// The turn that was counted, of such words; `None` where the sample has its angle.
+/// The counted turn from such words; `None` if the sample has its angle.
 pub fn counted_from_words([_, flags, angle]: [u32; 3]) -> Option<Angle> {
     (flags & 8 != 0).then_some(Angle(angle))
 }
 
-/// The command of such words.
+/// The command from such words.
 pub fn command_from_words([torque, flags, _]: [u32; 3]) -> DriveCommand {
     DriveCommand {
         enable: flags & 1 != 0,
@@ -300,7 +300,7 @@ pub fn command_from_words([torque, flags, _]: [u32; 3]) -> DriveCommand {
     }
 }
 
-/// The answer to [`Request::Ask`]; over the protocol the frame asks, not the words.
+/// The answer to [`Request::Ask`]; over the protocol the request is in the frame, not in the words.
 pub fn asked_to_block(asked: &operator::Request, feedback: &Feedback, frame: Option<Frame>) -> Block {
     filled(asked.to_words().into_iter().chain(feedback.to_words()).chain(frame.to_words()))
 }

@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = Path::new(&out);
     tractive_tablegen::build("machine", out.join("machine.rs"), "tractive::machine")?;
     fs::copy("memory.x", out.join("memory.x"))?;
-    // Interrupts without a handler of their own end in the default one.
+    // Interrupts without their own handler end in the default one.
     fs::write(out.join("device.x"), "PROVIDE(TIM1_UP = DefaultHandler);\nPROVIDE(TIM2 = DefaultHandler);\n")?;
     println!("cargo:rustc-link-search={}", out.display());
     println!("cargo:rustc-link-arg-bins=-Tlink.x");

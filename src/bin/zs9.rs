@@ -1,7 +1,7 @@
 //! The ZS9 firmware: two interrupts and an idle loop, nothing else.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-/// The image runs on a board; on the host there is nothing to do but to say so.
+/// The image runs on a board; on the host it only says so.
 #[cfg(not(target_os = "none"))]
 fn main() {
     println!(

@@ -41,7 +41,7 @@ pub static RECORDER: Recorder = Recorder::new();
 const CONTROL_TIMER: usize = 0x4000_0000;
 const PWM_TIMER: usize = 0x4000_2000;
 
-/// The interrupts this image uses, by their numbers on the board.
+/// The interrupts that this image uses, by their numbers on the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
 #[allow(
@@ -96,17 +96,17 @@ fn read_register(address: usize) -> u32 {
     unsafe { core::ptr::read_volatile(address as *const u32) }
 }
 
-/// `true` if there is an operator; without one the rig commands the drive, beside its samples.
+/// `true` if there is an operator; without one the rig commands the drive, along with its samples.
 static OPERATED: AtomicBool = AtomicBool::new(false);
 
-/// Opens the link and fetches the set-up. Call once, before [`start`].
+/// Opens the link and fetches the set-up. To be called once, before [`start`].
 pub fn connect() -> Setup {
     let setup = exchange::open();
     OPERATED.store(setup.line.is_some() || setup.over_protocol, Ordering::Relaxed);
     setup
 }
 
-/// The same, with where the MTPA of the papers' ordinary law starts.
+/// The same, with the start of the MTPA of the papers' ordinary law.
 pub fn connect_with_start() -> (Setup, MtpaStart) {
     let (setup, start) = exchange::open_with_start();
     OPERATED.store(setup.line.is_some() || setup.over_protocol, Ordering::Relaxed);
@@ -142,9 +142,9 @@ fn start_timers() {
     write_register(CONTROL_TIMER, ENABLE_INTERRUPT);
 }
 
-/// Waits for a while, in instructions that do nothing. Not `wfi`: with `sleep=off` QEMU 7.2 skips timer periods while the
-/// processor sleeps. Not a short loop: leaving a translated block costs more than a thousand idle instructions.
-/// Out of line: constants of a caller's would lie behind all of them, out of reach.
+/// Waits for a while, in instructions that do nothing. Not `wfi`: with `sleep=off` QEMU 7.2 skips timer periods while the processor sleeps. Not a
+/// short loop: leaving a translated block costs more than a thousand idle instructions. Out of line: otherwise a caller's constants would lie after
+/// all of them, out of reach.
 #[inline(never)]
 pub fn idle() {
     // SAFETY: the instructions read and write nothing.
@@ -159,13 +159,13 @@ pub fn stop(success: bool) -> ! {
     }
 }
 
-/// Does not start: names what is refused and ends the emulation. No interrupt is unmasked, and the gates are off.
+/// Refuses to start: names what is refused and ends the emulation. No interrupt is unmasked, and the gates are off.
 pub fn refuse(refused: &Refused) -> ! {
     exchange::refused(refused.name);
     stop(false)
 }
 
-/// Gates off, whatever state the program is in, then the end: for panics and HardFaults.
+/// Turns the gates off, whatever state the program is in, and ends: for panics and HardFaults.
 pub fn die() -> ! {
     exchange::dead();
     stop(false)
@@ -185,7 +185,7 @@ impl Control {
 }
 
 impl Pwm {
-    /// The timer's flag, which says that the interrupt is a carrier boundary's.
+    /// The timer's flag, which says that the interrupt comes for a carrier boundary.
     pub fn is_boundary(&self) -> bool {
         read_register(PWM_TIMER + 0x10) & 1 != 0
     }
@@ -270,12 +270,12 @@ impl PwmPort for Pwm {
 
 /// The idle loop's side of the board.
 pub struct Idle {
-    /// The protocol, where the operator is asked over it; `None`: the rig asks by words.
+    /// The protocol, if the operator's request comes over it; `None`: the rig's request comes in words.
     pub station: Option<&'static mut CanEndpoint>,
 }
 
 impl Idle {
-    /// At power-up.
+    /// The state at power-up.
     pub const fn new(station: Option<&'static mut CanEndpoint>) -> Self {
         Self { station }
     }

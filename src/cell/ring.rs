@@ -10,12 +10,12 @@ use super::{Words, acquire, load, order, release, store};
 
 /// The last `N` values of one writer, `N` a power of two.
 ///
-/// The writer is wait-free. Once it has been told of a fault it takes `N / 8` values more, the faulty one among them, and then
-/// no others: what led to the fault stays. The reader gets values only from a frozen ring, so nothing is written under its hands;
-/// should the ring be released while it reads, it notices and gets nothing.
+/// The writer is wait-free. Once a fault is reported to it, it takes `N / 8` more values, the faulty one among them, and then no others, so that the
+/// events before the fault remain. The reader gets values only from a frozen ring, so nothing is written while it reads; should the ring be released
+/// meanwhile, the reader notices and gets nothing.
 pub struct Ring<T, const W: usize, const N: usize> {
     slots: [[AtomicU32; W]; N],
-    /// Values ever written. Beyond its largest number it goes on with `N`: the ring stays full.
+    /// Values ever written. Beyond its largest number the count continues with `N`: the ring stays full.
     written: AtomicU32,
     /// The number of records that a release has forgotten.
     forgotten: AtomicU32,
@@ -25,7 +25,7 @@ pub struct Ring<T, const W: usize, const N: usize> {
 }
 
 impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
-    /// Values that are still taken from the faulty one on.
+    /// Number of values that are still taken, beginning with the faulty one.
     pub const AFTER: usize = {
         assert!(N.is_power_of_two() && N >= 8);
         N / 8
@@ -56,7 +56,7 @@ impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
         }
     }
 
-    /// Writer's side: the next value, and whether a fault is latched.
+    /// Writer's side: the next value, with the flag of a latched fault.
     #[inline(always)]
     pub fn record(&self, value: T, faulty: bool) {
         let after = self.after.load(Ordering::Relaxed);
@@ -68,23 +68,23 @@ impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
         store(slot, value.to_words());
         let next = written.wrapping_add(1);
         release(&self.written, if next == 0 { N as u32 } else { next });
-        // The last word to change: who sees it full sees all that it froze.
+        // The last word to change: whoever sees it full sees all that it froze.
         release(&self.after, after + u32::from(faulty));
     }
 
-    /// Writer's side: forgets the fault and what led to it, and records anew.
+    /// Writer's side: forgets the fault and the values before it, and records anew.
     pub fn release(&self) {
         self.after.store(0, Ordering::Relaxed);
         self.forgotten.store(self.written.load(Ordering::Relaxed), Ordering::Relaxed);
         order(Ordering::Release);
     }
 
-    /// Reader's side: whether a fault has frozen the ring.
+    /// Reader's side: `true` if a fault has frozen the ring.
     pub fn is_frozen(&self) -> bool {
         acquire(&self.after) == Self::AFTER as u32
     }
 
-    /// Reader's side: the value number `index`, 0 the oldest; `None` beyond the newest, and while the ring is not frozen.
+    /// Reader's side: value number `index`, 0 being the oldest; `None` beyond the newest, and while the ring is not frozen.
     pub fn read(&self, index: usize) -> Option<T> {
         if !self.is_frozen() {
             return None;

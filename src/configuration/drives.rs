@@ -8,18 +8,18 @@ use crate::time::Clock;
 use tractive_control::checked;
 use tractive_control::configuration::{ABOVE_ZERO, Bound, ROUNDING, Refused, within};
 
-/// Highest voltage of the capacitors over the source's: at a shoot-through duty of a quarter.
+/// Ratio of the capacitors' highest voltage to the source's: at a shoot-through duty of a quarter.
 const HIGHEST_SHARE: f32 = 1.5;
-/// Carrier periods in a control period.
+/// Most carrier periods in a control period.
 const MOST_CARRIERS: f32 = 8.0;
-/// The longest carrier period, in ticks: sixteen bits hold a half of it in compare steps.
+/// The longest carrier period, in ticks: sixteen bits must hold half of it in compare steps.
 const LONGEST_CARRIER: f32 = 4_000.0;
 
-/// Largest lag of the followed angle behind a rotor that accelerates by itself, in rad: what is left of the check's bound is for the sensor.
+/// Largest lag of the tracked angle behind a rotor that accelerates by itself, in rad: the rest of the check's bound is for the sensor.
 const LARGEST_LAG_RAD: f32 = 0.8 * INNOVATION_RAD;
-/// The oldest angle that can be brought up to date, in s.
+/// The oldest angle that can be extrapolated to the present, in s.
 pub const LATEST_ANGLE_S: f32 = 0.5e-3;
-/// Largest step of a counted angle, in rad: twice what counts as an angle that is lost.
+/// Largest step of a counted angle, in rad: twice the error that counts as a lost angle.
 const COARSEST_STEP_RAD: f32 = 0.1;
 /// Highest threshold of devices, in V.
 const HIGHEST_THRESHOLD_V: f32 = 20.0;
@@ -37,7 +37,7 @@ impl traction::Settings {
         check_acceleration(&tables.ratings, &self.clock)
     }
 
-    /// The same for a machine that is checked already.
+    /// The same for a machine that has been checked already.
     ///
     /// # Errors
     /// The first scalar that makes no sense.
@@ -85,7 +85,7 @@ impl dual::Settings {
         checked!(gains.check());
         checked!(check_speed(speed, clock.control_s(), &tables.ratings));
         checked!(check_acceleration(&tables.ratings, clock));
-        // What shoot-through makes of the source, and room to regulate; ratings are rounded.
+        // The voltage that shoot-through makes from the source, and room to regulate; ratings are rounded.
         let most_v = 1.01 * HIGHEST_SHARE * tables.z_source.source_v * dual::TWO_LEVEL_SHARE;
         checked!(within(
             &[Bound("ratings.dc_link_max_v", tables.ratings.dc_link_max_v, ABOVE_ZERO, most_v),]
@@ -95,7 +95,7 @@ impl dual::Settings {
         check_limits(limits)
     }
 
-    /// The check that carrier and dead time suit a clock which is checked already.
+    /// The check that carrier and dead time suit a clock which has been checked already.
     ///
     /// # Errors
     /// The first of them that does not.
@@ -105,7 +105,7 @@ impl dual::Settings {
         let carrier = *carrier_ticks as f32;
         let longest = if control < LONGEST_CARRIER { control } else { LONGEST_CARRIER };
         checked!(within(&[Bound("carrier_ticks", carrier, control / MOST_CARRIERS, longest)]));
-        // An even number, and a whole part of the control period.
+        // An even number, and an integer fraction of the control period.
         let whole = clock.control_ticks.is_multiple_of(*carrier_ticks) && carrier_ticks.is_multiple_of(2);
         if !whole {
             return Err(Refused { name: "carrier_ticks", value: carrier, least: control, most: control });
@@ -114,7 +114,7 @@ impl dual::Settings {
     }
 }
 
-/// An acceleration that the tracked angle can follow.
+/// The check that the tracked angle can follow the acceleration.
 const fn check_acceleration(ratings: &Ratings, clock: &Clock) -> Result<(), Refused> {
     let most = SpeedTracker::most_acceleration_rad_s2(LARGEST_LAG_RAD, clock.control_s());
     within(&[Bound("ratings.max_acceleration_rad_s2", ratings.max_acceleration_rad_s2, ABOVE_ZERO, most)])
@@ -122,7 +122,7 @@ const fn check_acceleration(ratings: &Ratings, clock: &Clock) -> Result<(), Refu
 
 const fn check_speed(speed: &SpeedDesign, control_s: f32, ratings: &Ratings) -> Result<(), Refused> {
     let SpeedDesign { inertia_kg_m2, natural_rad_s, period_s } = *speed;
-    // The loop runs where its motor has a new operating point.
+    // The loop runs when its motor has a new operating point.
     let turns_s = dual::TURNS as f32 * control_s;
     let most_nm = (1.0 + ROUNDING) * SpeedDesign::STIFFEST * ratings.max_torque_nm;
     within(&[
@@ -157,7 +157,7 @@ const fn check_link(link: &ZSourceDesign, control_s: f32) -> Result<(), Refused>
     ])
 }
 
-/// The gains are those of the design.
+/// The check that the gains are those of the design.
 const fn check_link_gains(gains: &ZSourceGains, link: &ZSourceDesign) -> Result<(), Refused> {
     const LEAST: f32 = 0.99;
     const MOST: f32 = 1.01;

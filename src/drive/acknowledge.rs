@@ -1,25 +1,25 @@
-//! The acknowledge of a fault, as control and the PWM interrupt carry it out together.
+//! The acknowledge of a fault, which control and the PWM interrupt carry out together.
 
-/// Control's side. The operator's number says that he has seen the fault; a release, which has a number of its own, makes the PWM
-/// interrupt forget its fault and leave the safe state. A release is asked for only while control holds a fault, and so never with a
-/// command of pulses; while control holds none the operator's number has nothing to forget, now or later.
+/// Control's side. The operator's number says that he has seen the fault. A release, which has its own number, makes the PWM interrupt forget its
+/// fault and leave the safe state. Control asks for a release only while it holds a fault, so never together with a command of pulses. While control
+/// holds no fault, the operator's number has nothing to forget, now or later.
 pub(super) struct Acknowledge {
-    /// Number of the operator's acknowledge that has been answered.
+    /// Number of the last operator's acknowledge that has been answered.
     answered: u8,
-    /// Number of the release that was asked of the PWM interrupt last.
+    /// Number of the last release that was requested from the PWM interrupt.
     release: u8,
     /// `true` while that release has not been carried out yet.
     pending: bool,
 }
 
 impl Acknowledge {
-    /// At power-up.
+    /// The state at power-up.
     pub(super) const fn new() -> Self {
         Self { answered: 0, release: 0, pending: false }
     }
 
-    /// One control period, before its checks: the operator's `number`, whether control is `tripped`, and the release that the PWM
-    /// interrupt has `carried_out`, if that is known. True when control is to forget its fault.
+    /// One control period, before its checks, with the operator's `number`, whether control is `tripped`, and the release that the PWM interrupt has
+    /// `carried_out`, if known. Returns true when control is to forget its fault.
     pub(super) fn step(&mut self, number: u8, tripped: bool, carried_out: Option<u8>) -> bool {
         if self.pending {
             let done = carried_out == Some(self.release);
@@ -36,8 +36,8 @@ impl Acknowledge {
         false
     }
 
-    /// The safe state entered once more: the PWM interrupt may have left it for a release that control has not seen carried out, and is
-    /// asked to leave it anew.
+    /// The safe state was entered again: the PWM interrupt may have left it for a release that control has not yet seen carried out, so it is asked
+    /// to leave it anew.
     pub(super) fn entered(&mut self) {
         self.release = self.release.wrapping_add(u8::from(self.pending));
     }

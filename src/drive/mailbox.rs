@@ -1,5 +1,5 @@
-//! The mailboxes between the operator in the idle loop and the control interrupt: words with instants, so that the same control period
-//! sees the same command wherever the idle loop stood.
+//! The mailboxes between the operator in the idle loop and the control interrupt. Words carry instants, so that a given control period sees the same
+//! command wherever the idle loop was at the time.
 
 use crate::cell::{Mailbox, Seqlock, Words};
 use crate::control::{Demand, LinkWindow, Warmth};
@@ -22,14 +22,14 @@ pub struct Observation<R = Report> {
     pub report: R,
 }
 
-/// A command and from when on it holds; that is the first word.
+/// A command and the instant from which it holds; the instant is the first word.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timed<C> {
     command: C,
     from: Instant,
 }
 
-/// The word of [`Timed`] that says from when on it holds.
+/// The word of [`Timed`] that says from when the command holds.
 const FROM: usize = 0;
 
 impl Words<7> for Timed<DriveCommand> {
@@ -144,7 +144,7 @@ where
     Observation<R>: Words<OBSERVATION>,
     Timed<C>: Words<COMMAND>,
 {
-    /// Control's side: whether the period that began at the instant has told of itself, as the first of a slot does.
+    /// Control's side: `true` if the period that began at the instant has reported, as the first of a slot does.
     pub fn has_told(&self, at: Instant) -> bool {
         self.observed().is_some_and(|observed| observed.at == at)
     }
@@ -155,7 +155,7 @@ where
         Self { command: Mailbox::new(), observed: Seqlock::new() }
     }
 
-    /// In the control interrupt: what is commanded at `now`; nothing before the first command.
+    /// In the control interrupt: the command that holds at `now`; no command before the first one.
     #[inline]
     pub(super) fn command(&self, now: Instant) -> C {
         match self.command.newest(|timed| now.reached(Instant(timed.word::<FROM>()))) {
@@ -170,23 +170,23 @@ where
         self.observed.publish(Observation { at: now, report: *report });
     }
 
-    /// In the idle loop: the newest slot's words; `None` before the first, or when every try was overtaken.
+    /// In the idle loop: the newest slot's words; `None` before the first slot, or when every attempt to read was overtaken.
     #[inline(never)]
     pub fn observed(&self) -> Option<Observation<R>> {
         self.observed.read()
     }
 
-    /// In the idle loop: what is commanded from an instant on, in a slot the next slot's beginning.
+    /// In the idle loop: publishes a command that holds from an instant on; within a slot that instant is the beginning of the next slot.
     pub fn publish(&self, command: C, from: Instant) {
         self.command.publish(Timed { command, from });
     }
 }
 
-/// The control interrupt's count of the periods in a slot, the operator's step: a millisecond.
+/// The control interrupt's counter of the periods in a slot, the operator's step: a millisecond.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlotTimer {
     periods: u32,
-    /// Those until the next slot, 1 at least.
+    /// Periods until the next slot, 1 at least.
     left: u32,
 }
 

@@ -15,17 +15,17 @@ pub enum Gates {
     Off,
 }
 
-/// From control to the PWM interrupt: the half that is to be loaded at a boundary, and what the interrupt must know beside it.
+/// From control to the PWM interrupt: the half to be loaded at a boundary, and what else the interrupt must know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PlannedHalf {
-    /// The boundary where it is loaded; it begins at the one after it.
+    /// The boundary at which it is loaded; the half begins at the boundary after it.
     pub at: Instant,
     /// The half.
     pub half: CarrierHalf,
     /// Number of the last release: a new one makes the PWM interrupt forget its fault and leave the safe state.
     pub release: u8,
-    /// Angle units (2⁻³² turn) per tick by which the voltage turns, and the DC-link voltage, in V: the safe state is chosen by them.
+    /// Angle units (2⁻³² turn) per tick by which the voltage turns, and the DC-link voltage, in V; both serve to choose the safe state.
     pub rate: f32,
     /// See `rate`.
     pub udc_v: f32,
@@ -55,7 +55,7 @@ impl Words<PLANNED_WORDS> for PlannedHalf {
     }
 }
 
-/// A [`PlannedHalf`] where it lies.
+/// A [`PlannedHalf`] where it is stored.
 pub struct PlannedRecord<'a>(pub Record<'a, PLANNED_WORDS>);
 
 impl PlannedRecord<'_> {
@@ -65,7 +65,7 @@ impl PlannedRecord<'_> {
         Instant(self.0.word::<0>())
     }
 
-    /// See [`PlannedHalf::half`]; without the modes of the halves that follow, which no board asks for.
+    /// See [`PlannedHalf::half`]; without the modes of the following halves, which no board asks for.
     #[inline]
     pub fn half(&self) -> CarrierHalf {
         let packed = self.0.word::<5>() & ((1 << NEXT) - 1);
@@ -74,7 +74,7 @@ impl PlannedRecord<'_> {
         half_from_words([period, u, v, w, packed])
     }
 
-    /// `true` if the gates are off in it.
+    /// `true` if the gates are off in this half.
     #[inline]
     pub fn is_off(&self) -> bool {
         mode_at(self.0.word::<5>(), MODE) == Mode::Off as u32
@@ -99,20 +99,21 @@ impl PlannedRecord<'_> {
     }
 }
 
-/// From the PWM interrupt to control, one record a boundary: the samples there, and that a half was loaded, which begins at the next one.
+/// From the PWM interrupt to control, one record per boundary: the samples there, and the fact that a half was loaded, which begins at the next
+/// boundary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Loaded {
     /// The boundary.
     pub at: Instant,
-    /// The boundary where the half begins that was loaded.
+    /// The boundary at which the loaded half begins.
     pub begins: Instant,
-    /// Phase currents there, in A.
+    /// Phase currents at the boundary, in A.
     pub currents_a: Abc,
-    /// `true` once the PWM interrupt has found a fault, which then stands in a cell of its own: it loads halves without pulses, whatever is
-    /// planned.
+    /// `true` once the PWM interrupt has found a fault, which then stands in a cell of its own; from then on it loads halves without pulses, whatever
+    /// is planned.
     pub tripped: bool,
-    /// Number of the release that it carried out last.
+    /// Number of the release carried out last.
     pub released: u8,
 }
 
@@ -131,7 +132,7 @@ impl Loaded {
     }
 }
 
-/// A [`Loaded`] where it lies.
+/// A [`Loaded`] where it is stored.
 pub struct LoadedRecord<'a>(pub Record<'a, LOADED_WORDS>);
 
 impl LoadedRecord<'_> {
@@ -161,7 +162,7 @@ impl LoadedRecord<'_> {
     }
 }
 
-/// Places of modes and number in the word of a half, above its levels; a mode's code has six bits.
+/// Positions of modes and number in the word of a half, above its levels; a mode's code has six bits.
 const MODE: u32 = 5;
 const NUMBER: u32 = 11;
 const NEXT: u32 = 19;
@@ -169,13 +170,13 @@ const NEXT_BUT_ONE: u32 = 25;
 const _: () = assert!(MODE_CODES << MODE <= 1 << NUMBER && 1 << (NUMBER + 8) <= 1 << NEXT);
 const _: () = assert!(MODE_CODES << NEXT <= 1 << NEXT_BUT_ONE && MODE_CODES << (NEXT_BUT_ONE - 1) <= 1 << 31);
 
-/// The mode at a place of a word.
+/// The mode at a position in a word.
 #[inline(always)]
 const fn mode_at(word: u32, place: u32) -> u32 {
     word >> place & (MODE_CODES - 1)
 }
 
-/// The space vector of on-times in ticks: times the link voltage it is volt-ticks.
+/// The space vector of on-times in ticks; multiplied by the link voltage it gives volt-ticks.
 #[inline]
 pub fn volt_ticks([a, b, c]: [u32; 3]) -> AlphaBeta {
     let (a, b, c) = (a as i32, b as i32, c as i32);

@@ -1,5 +1,4 @@
-//! The systems: control, pulses, cells and protection put together. What the two interrupts call, on any board and
-//! on the host.
+//! The systems: control, pulses, cells and protection put together into what the two interrupts call, on any board and on the host.
 
 #![forbid(unsafe_code)]
 
@@ -19,7 +18,7 @@ pub use messages::{
     half_to_words, volt_ticks,
 };
 
-/// The input of a control period: what was measured, and what the operator commands.
+/// The input of a control period: the measurements and the operator's command.
 #[derive(Clone, Copy)]
 struct PeriodInput<'a, S: System> {
     sample: &'a S::Sample,

@@ -1,5 +1,5 @@
-//! The law whose voltages show what an unknown machine is like. Commanded by the rig, the host is told each observation at once; over the
-//! protocol they are kept, and told in frames once the experiment is over.
+//! The law whose voltages reveal the properties of an unknown machine. If the rig commands it, each observation is sent to the host at once; over the
+//! protocol the observations are kept, and sent in frames once the experiment is over.
 
 use crate::qemu::{self, exchange};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -23,8 +23,7 @@ static MEMORY: Memory = Memory::new();
 static UNITS: Units = Units::of(&BUILT_IN.ratings);
 static OVER_PROTOCOL: AtomicBool = AtomicBool::new(false);
 
-/// Opens the link and fetches the set-up. Nothing compensates the dead time, whatever the host says: the fit counts the pulses as they are
-/// commanded.
+/// Opens the link and fetches the set-up. Nothing compensates the dead time, whatever the host says: the fit uses the pulses as they are commanded.
 pub fn connect() -> Setup {
     let setup = qemu::connect();
     OVER_PROTOCOL.store(setup.over_protocol, Ordering::Relaxed);
@@ -44,15 +43,15 @@ pub fn tell(task: &mut ControlTask<BuiltIn, Law>, shared: &Shared, now: Instant)
     }
 }
 
-/// The idle loop's side of the board, with the experiment's frames where the drive's leave room.
+/// The idle loop's side of the board, with the experiment's frames in the slots that the drive's frames leave free.
 pub struct Idle {
-    /// The protocol, where the operator is asked over it; `None`: the rig asks by words.
+    /// The protocol, if the operator's request comes over it; `None`: the rig's request comes in words.
     pub station: Option<&'static mut CanEndpoint>,
     teller: Teller,
 }
 
 impl Idle {
-    /// At power-up.
+    /// The state at power-up.
     pub const fn new(station: Option<&'static mut CanEndpoint>) -> Self {
         Self { station, teller: Teller::new() }
     }

@@ -1,4 +1,4 @@
-//! The papers' ordinary control law; the host tells where its MTPA starts.
+//! The papers' ordinary control law; the host gives the start of its MTPA.
 
 use crate::qemu;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -16,7 +16,7 @@ pub const AT_REST: Law = PiLaw::new();
 
 static STARTS_AT_ZERO: AtomicBool = AtomicBool::new(false);
 
-/// Opens the link and fetches the set-up, with where MTPA starts.
+/// Opens the link and fetches the set-up, with the start of MTPA.
 pub fn connect() -> Setup {
     let (setup, start) = qemu::connect_with_start();
     STARTS_AT_ZERO.store(start == MtpaStart::Zero, Ordering::Relaxed);

@@ -1,5 +1,5 @@
-//! The PMaSynRM's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected;
-//! and with the control law that its `law` names and the pulse patterns of its `patterns`.
+//! The PMaSynRM's two interrupts and its idle loop. The image's root names the `qemu` (the board, or the board with faults injected), by its `law`
+//! the control law, and by its `patterns` the pulse patterns.
 
 use crate::law::{self, Law};
 use crate::patterns;
@@ -34,7 +34,7 @@ static IRON_SHARE: AtomicU32 = AtomicU32::new(0);
 /// Highest frequency of the free carrier, in Hz.
 const MAX_CARRIER_HZ: f32 = patterns::FREE_CARRIER_SHARE * BUILT_IN.ratings.max_switching_hz;
 
-/// Until the host has told its own.
+/// The settings until the host has sent its own.
 const DEFAULTS: Settings = Settings::new(CLOCK, SwitchLimits::new(0, 0, MAX_CARRIER_HZ, &CLOCK));
 
 fn settings() -> Settings {
@@ -99,7 +99,7 @@ fn main() -> ! {
     }
 }
 
-/// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
+/// Deadline: the next control interrupt. If missed: fault `control_deadline`, gates into the safe state.
 #[interrupt]
 fn TIMER0() {
     static mut TASK: ControlTask<BuiltIn, Law> =

@@ -1,5 +1,5 @@
-//! The ZS9's two interrupts and its idle loop, on whichever `qemu` the image's root names: the board, or the board with faults injected;
-//! and with the control law that its `law` names.
+//! The ZS9's two interrupts and its idle loop. The image's root names the `qemu` (the board, or the board with faults injected) and, by its `law`,
+//! the control law.
 
 use crate::law::{self, Law};
 use crate::qemu::{self, CLOCK, Interrupt as interrupt};
@@ -12,9 +12,9 @@ use tractive::operator::{self, DualSlot, Line, slot_s};
 use tractive::protocol::Zs9CanEndpoint;
 
 static SHARED: Shared = Shared::recorded_by(&qemu::DUAL_RECORDER);
-/// Until the host has told its carrier and its dead time.
+/// The settings until the host has sent its carrier and its dead time.
 const DEFAULTS: Settings = Settings::new(CLOCK, CLOCK.control_ticks, &BUILT_IN);
-/// As the operator looks at them.
+/// The ratings as the operator uses them.
 static RATINGS: Ratings = Settings::operator_ratings(&BUILT_IN.ratings);
 static CARRIER_TICKS: AtomicU32 = AtomicU32::new(0);
 static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
@@ -52,7 +52,7 @@ fn main() -> ! {
     }
 }
 
-/// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
+/// Deadline: the last peak before the next control interrupt. If missed: fault `control_deadline`, all gates off.
 #[interrupt]
 fn TIMER0() {
     static mut TASK: ControlTask<BuiltIn, Law> =
@@ -67,7 +67,7 @@ fn TIMER0() {
     TASK.run(&mut board, &SHARED);
 }
 
-/// Deadline: the next valley, where the shadow registers take over. Missed: the watch's.
+/// Deadline: the next valley, where the shadow registers take over. If missed: left to the watch.
 #[interrupt]
 fn DUALTIMER() {
     static mut TASK: PwmTask<BuiltIn> = PwmTask::new(BuiltIn, DEFAULTS);

@@ -1,4 +1,4 @@
-//! The papers' ordinary control law for both motors. They are linear, so where MTPA starts makes no difference.
+//! The papers' ordinary control law for both motors. The motors are linear, so the start of MTPA makes no difference.
 
 use tractive::control::PiLaw;
 use tractive::drive::dual::TRACKING_RAD_S;

@@ -1,4 +1,4 @@
-//! From a request to demands: its values checked, its torque within its limits, on its way to the drive.
+//! From a request to demands: its values are checked and its torque is kept within its limits on its way to the drive.
 
 use super::grip::Grip;
 use super::line_limits::{Drawn, Most};
@@ -22,38 +22,38 @@ pub trait Demands: Copy {
     /// The status of the demands.
     type Status: Copy + core::fmt::Debug;
 
-    /// Nothing asked for.
+    /// The state without any demand.
     const AT_REST: Self;
-    /// `true` if its limits derate by temperatures; otherwise nobody looks at them, whatever the settings know.
+    /// `true` if its limits are derated by temperatures; otherwise temperatures are ignored, whatever the settings contain.
     const DERATES: bool = false;
 
     /// The request's levels.
     fn levels(request: &Self::Request) -> Levels;
-    /// The part of the observation that is the same for every drive.
+    /// The part of the observation that is common to all drives.
     fn seen(observed: &Observation<Self::Report>) -> Seen;
-    /// The report of a drive that has not started, `trip` says why.
+    /// The report of a drive that has not started; `trip` gives the reason.
     fn refused(trip: Trip) -> Self::Report;
     /// The reason why the request's values cannot be used as they are.
     fn wrong_with(request: &Self::Request, settings: &Settings) -> Option<Refusal>;
-    /// `true` if more is asked for than nothing.
+    /// `true` if a torque or speed other than zero is asked for.
     fn asks_torque(request: &Self::Request) -> bool;
-    /// Takes over limits that are good.
+    /// Adopts limits that are valid.
     fn take_limits(&mut self, request: &Self::Request);
-    /// Takes over what the temperatures leave of the limits, 0 ..= 1, and make of the machine.
+    /// Adopts the share of the limits that the temperatures leave, 0 ..= 1, and the machine's warmth.
     #[inline]
     fn derate(&mut self, _share: f32, _warmth: Warmth) {}
-    /// `true` if nothing is asked for any more.
+    /// `true` if there is no demand any more.
     fn are_at_rest(&self) -> bool;
-    /// At rest at once.
+    /// Brings the demands to rest at once.
     fn drop(&mut self);
-    /// One slot towards what is asked; towards nothing without a request.
+    /// One slot towards the requested values; towards zero without a request.
     fn step(&mut self, request: Option<&Self::Request>, report: &Self::Report, settings: &Settings);
     /// `true` if the gates may go off at the end of a stop, as far as the link is concerned.
     #[inline]
     fn link_may_rest(_report: &Self::Report) -> bool {
         true
     }
-    /// The demands as they stand.
+    /// The present demands.
     fn told(&self) -> Self::Status;
     /// The command to the drive.
     fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Self::DriveCommand;
@@ -65,7 +65,7 @@ pub struct TorqueDemand {
     ramp: Ramp,
     /// The ramp's torque within the line's limits, in N·m: they move with the speed, faster than slew and jerk let the ramp follow.
     given_nm: f32,
-    /// The limits that hold; `None`: as rated.
+    /// The limits in force; `None`: as rated.
     limits: Option<Limits>,
     /// The share of them that the temperatures leave.
     share: f32,
@@ -88,7 +88,7 @@ impl TorqueDemand {
     }
 }
 
-/// A torque within what is left of motoring and braking at a speed.
+/// A torque limited to the motoring and braking that remain at a speed.
 fn within(torque_nm: f32, speed: f32, most: &Most) -> f32 {
     let Most { motoring_nm, braking_nm } = *most;
     if speed < 0.0 {
@@ -216,14 +216,14 @@ impl Demands for TorqueDemand {
     }
 }
 
-/// Share of the speed limit below it over which torque that raises the speed fades.
+/// Share of the speed limit, below that limit, over which torque that raises the speed fades.
 const SPEED_SPAN: f32 = 0.05;
 
 /// The reason why the request's values cannot be used as they are.
 #[inline(never)]
 fn wrong_with(request: &Request, ratings: &Ratings) -> Option<Refusal> {
     let Limits { motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v } = request.limits;
-    // Not finite if one is not.
+    // The sum is not finite if one term is not.
     let sum: f32 =
         [request.torque_nm, motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v].iter().sum();
     if !sum.is_finite() {
@@ -240,7 +240,7 @@ fn wrong_with(request: &Request, ratings: &Ratings) -> Option<Refusal> {
     (!inside).then_some(Refusal::LimitOutOfRange)
 }
 
-/// The torque that is asked for, within the limits at a mechanical speed in rad/s, in N·m.
+/// The requested torque, within the limits at a mechanical speed in rad/s, in N·m.
 pub(super) fn wanted_nm(torque_nm: f32, speed: f32, limits: &MotorLimits) -> f32 {
     let fade = limit((limits.speed_rad_s - speed.abs()) / (SPEED_SPAN * limits.speed_rad_s), 0.0, 1.0);
     let motoring_nm = fade * limits.motoring_nm;
@@ -249,12 +249,12 @@ pub(super) fn wanted_nm(torque_nm: f32, speed: f32, limits: &MotorLimits) -> f32
     limit(torque_nm, lowest, highest)
 }
 
-/// Share of the largest torque that holds a link without source, where it gives the largest power; slower in proportion, so that at
-/// standstill, where nothing is to be gained, there is none.
+/// Share of the largest torque that holds a link without source, at speeds where it gives the largest power; at lower speeds less in proportion, so
+/// that at standstill, where nothing is to be gained, it is zero.
 const HOLDING_SHARE: f32 = 0.1;
 
-/// The largest motoring torque that a link in its window is to give, in N·m. Below the window a machine that turns brakes a little, whatever is
-/// asked for: so its own energy holds the link while the line is away.
+/// The largest motoring torque that a link in its window is to give, in N·m. Below the window a turning machine brakes a little, whatever is asked
+/// for, so that its own energy holds the link while the line is away.
 fn motoring_nm(report: &Report, window: &LinkWindow, ratings: &Ratings) -> f32 {
     let share = (report.udc_v - window.motoring_none_v) / (window.motoring_full_v - window.motoring_none_v);
     let power_w = ratings.max_torque_nm * report.omega.abs() / ratings.pole_pairs;
@@ -264,12 +264,12 @@ fn motoring_nm(report: &Report, window: &LinkWindow, ratings: &Ratings) -> f32 {
 
 /// The line's voltage as the link has shown it, in V; 0 while it is not known.
 ///
-/// A line that is lost takes the link with it in milliseconds; one that sags does so in seconds. So motoring ends a little below what the
-/// line gave some seconds ago: the drive then holds the link near it, and a line that comes back finds little to charge.
+/// When the line is lost the link falls with it in milliseconds; when it sags, in seconds. So motoring ends a little below the voltage that the line
+/// gave some seconds ago: the drive then holds the link near that voltage, and a returning line finds little to charge.
 #[derive(Clone, Copy, Debug)]
 struct LineVoltage(f32);
 
-/// Time constant at which the line's voltage is learned, in s.
+/// Time constant with which the line's voltage is learned, in s.
 const LINE_S: f32 = 3.0;
 /// Shares of the line's voltage between which motoring ends.
 const MOTORING_FULL: f32 = 0.95;
@@ -278,8 +278,8 @@ const MOTORING_NONE: f32 = 0.85;
 impl LineVoltage {
     const UNKNOWN: Self = Self(0.0);
 
-    /// One slot. Braking lifts the link above the line, and behind a rectifier it stays there: only a drive that takes power sees a line
-    /// that rises.
+    /// One slot. Braking lifts the link above the line, and behind a rectifier it stays there: only a drive that takes power can see the line's
+    /// voltage rise.
     fn step(&mut self, report: &Report, slot_s: f32) {
         let Self(line_v) = self;
         let takes = report.torque_nm * report.omega > 0.0;
@@ -304,7 +304,7 @@ impl LineVoltage {
     }
 }
 
-/// A link that has lost its source while the main contactor is closed: it must not come back without precharge.
+/// The check for a link that has lost its source while the main contactor is closed: the source must not return without precharge.
 pub(super) fn link_lost(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     settings.line.as_ref()?;
     protection::check_undervoltage(input.observed.udc_v, settings.ratings)
@@ -320,7 +320,7 @@ mod tests {
     use super::*;
     use crate::built_in::traction::BUILT_IN;
 
-    /// Warmth and limits stay; torque on its way does not.
+    /// Warmth and limits remain; torque on its way is dropped.
     #[test]
     fn a_demand_that_is_dropped_keeps_its_derating() {
         let settings = Settings::rated(&BUILT_IN.ratings, 1e-3, None);
@@ -333,7 +333,7 @@ mod tests {
         assert_eq!(most_nm, 0.5 * Limits::rated(settings.ratings).motoring_nm);
     }
 
-    /// The line is what the link was, falls with it, and rises with it while power is taken.
+    /// The line's voltage is taken from the link, falls with it, and rises with it while power is taken.
     #[test]
     fn the_line_is_known_by_the_link() {
         let report = |udc_v, omega| Report { udc_v, torque_nm: 100.0, omega, ..Report::default() };

@@ -1,5 +1,5 @@
-//! The ZS9's request: of each motor a torque or a speed, of the link its voltage. One state machine, so one fault, one stop and
-//! one enabling edge are both motors'.
+//! The ZS9's request: a torque or a speed for each motor, and a voltage for the link. Both motors share one state machine, so a fault, a stop and an
+//! enabling edge each apply to both.
 
 use super::demand::wanted_nm;
 use super::set_point::SetPoint;
@@ -11,12 +11,12 @@ use crate::machine::Ratings;
 use crate::ports::{DualDriveCommand, DualReport, MotorDemand};
 use crate::protection::Trip;
 
-/// Share of the source's voltage by which the link may be above it when the gates go off at the end of a stop: what is more swings
-/// back into the source through the inductors.
+/// Share of the source's voltage by which the link may exceed it when the gates go off at the end of a stop: any more swings back into the source
+/// through the inductors.
 const RESTING_SHARE: f32 = 0.05;
 
-/// Time over which the torque that holds a speed is the mean, in s. At an instant the speed loop's torque is full of the speed's noise: behind an encoder
-/// of 4,096 counts up to 90 N·m of 120, which ramped down from there spun the ZS9's free motor to 390 r/min.
+/// Averaging time of the torque that holds a speed, in s. The instantaneous torque of the speed loop is full of the speed's noise: with an encoder of
+/// 4,096 counts up to 90 N·m of 120, which, ramped down from there, spun the ZS9's free motor to 390 r/min.
 const HOLDING_S: f32 = 0.05;
 
 /// The demand on one motor.
@@ -43,7 +43,7 @@ impl Wanted {
 pub struct MotorLimits {
     /// Largest motoring torque, in N·m, 0 ..= the rated largest.
     pub motoring_nm: f32,
-    /// Largest braking torque, in N·m, 0 ..= the rated largest. At a speed demand the smaller of both holds.
+    /// Largest braking torque, in N·m, 0 ..= the rated largest. For a speed demand the smaller of both holds.
     pub braking_nm: f32,
     /// Mechanical speed at which torque that would raise it further is zero, and the largest speed demand, in rad/s, above 0, at
     /// most the rated largest.
@@ -51,7 +51,7 @@ pub struct MotorLimits {
 }
 
 impl MotorLimits {
-    /// As the machine is rated.
+    /// The limits as the machine is rated.
     pub const fn rated(ratings: &Ratings) -> Self {
         let Ratings { max_torque_nm, max_speed_rad_s, .. } = *ratings;
         Self { motoring_nm: max_torque_nm, braking_nm: max_torque_nm, speed_rad_s: max_speed_rad_s }
@@ -84,12 +84,12 @@ pub struct DualRequest {
     pub levels: Levels,
     /// Upper motor, lower motor.
     pub motors: [MotorRequest; 2],
-    /// Link voltage wanted outside shoot-through, in V, from the lowest to what the network's highest voltage gives.
+    /// Desired link voltage outside shoot-through, in V, from the lowest to what the network's highest voltage gives.
     pub link_ref_v: f32,
 }
 
 impl DualRequest {
-    /// Nothing wanted, limits as rated; the link at this voltage.
+    /// A request for nothing, with limits as rated and the link at this voltage.
     pub const fn idle(ratings: &Ratings, link_ref_v: f32) -> Self {
         let motor = MotorRequest { wanted: Wanted::Torque(0.0), limits: MotorLimits::rated(ratings) };
         Self { levels: Levels::NONE, motors: [motor; 2], link_ref_v }
@@ -100,7 +100,7 @@ impl DualRequest {
 #[derive(Clone, Copy, Debug)]
 enum DemandRamp {
     Torque(Ramp),
-    /// The speed's reference, and the torque that holds it, in N·m.
+    /// The speed's reference, and the torque that holds the speed, in N·m.
     Speed(SetPoint, f32),
 }
 
@@ -119,7 +119,8 @@ impl DemandRamp {
         matches!(self, Self::Torque(ramp) if ramp.torque_nm() == 0.0)
     }
 
-    /// One slot. A demand of the other kind begins where the motor is: torque at what has held its speed, speed at its speed.
+    /// One slot. A demand of the other kind begins at the motor's present state: torque at the value that has held the speed, speed at the motor's
+    /// speed.
     fn step(&mut self, wanted: Wanted, motor: &Motor, limits: &MotorLimits, settings: &Settings) {
         *self = match (wanted, *self) {
             (Wanted::Torque(torque_nm), ramp) => {
@@ -157,10 +158,10 @@ impl DemandRamp {
 #[derive(Clone, Copy, Debug)]
 pub struct DualDemands {
     ramps: [DemandRamp; 2],
-    /// The limits that hold; `None`: as rated.
+    /// The limits in force; `None`: as rated.
     limits: Option<[MotorLimits; 2]>,
     link_ref_v: f32,
-    /// While it stops the link goes down to the source's voltage.
+    /// The link voltage that goes down to the source's during a stop.
     resting_v: Option<f32>,
 }
 
@@ -211,7 +212,7 @@ impl Demands for DualDemands {
             let MotorLimits { motoring_nm, braking_nm, speed_rad_s } = motor.limits;
             [motor.wanted.value(), motoring_nm, braking_nm, speed_rad_s].iter().sum()
         };
-        // Not finite if one is not.
+        // The sum is not finite if one term is not.
         if ![sum(m1), sum(m2), request.link_ref_v].iter().sum::<f32>().is_finite() {
             return Some(Refusal::RequestNotFinite);
         }
@@ -276,7 +277,7 @@ impl Demands for DualDemands {
     }
 }
 
-/// The larger of two magnitudes; not a number is larger than everything.
+/// The larger of two magnitudes; NaN counts as larger than everything.
 fn larger(a: f32, b: f32) -> f32 {
     if a > b || a.is_nan() { a } else { b }
 }

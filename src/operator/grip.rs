@@ -1,19 +1,19 @@
-//! Slip and slide: a rotor that accelerates faster than a train can has lost its rail.
+//! Slip and slide: a rotor that accelerates faster than a train can has lost its grip on the rail.
 //!
-//! A reference follows the rotor's speed, smoothed, along the torque, motoring upward, braking downward, at most at the acceleration limit. What the rotor is
-//! ahead of it is slip. The torque's share falls at once in proportion to the slip, and further while it lasts; with grip it comes back along a
-//! straight line.
+//! A reference follows the smoothed speed of the rotor in the direction of the torque, upward when motoring, downward when braking, at most at the
+//! acceleration limit. The slip is the rotor's lead over it. The torque's share falls at once in proportion to the slip, and further while the slip
+//! lasts; once grip is back the share returns along a straight line.
 
 use super::Settings;
 use crate::frames::limit;
 
-/// Slip that is left alone, and slip beyond it that takes all torque away, as shares of the largest speed.
+/// Slip that is ignored, and slip beyond it that removes all torque, as shares of the largest speed.
 const FREE: f32 = 0.005;
 const SPAN: f32 = 0.02;
-/// Time in which slip of the whole span takes all torque away for good, and in which it comes back, in s.
+/// Time in which slip of the whole span removes all torque lastingly, and in which that torque returns, in s.
 const LOSE_S: f32 = 0.3;
 const RESTORE_S: f32 = 1.0;
-/// Time constant by which the rotor's speed is smoothed, in s. An angle that is off by ε once or twice a turn moves a speed that is smoothed over τ by ε/τ to both
+/// Smoothing time constant of the rotor's speed, in s. An angle that is off by ε once or twice a turn moves a speed smoothed over τ by ε/τ to both
 /// sides, electrical, whatever the speed.
 const SMOOTHED_S: f32 = 0.016;
 
@@ -26,7 +26,7 @@ pub(super) struct Grip {
     speed: f32,
     /// The reference, along the torque, mechanical, in rad/s.
     reference: f32,
-    /// Share of the torque that comes back slowly.
+    /// Share of the torque that returns slowly.
     held: f32,
     /// Share of the torque.
     share: f32,
@@ -35,12 +35,12 @@ pub(super) struct Grip {
 impl Grip {
     pub(super) const FULL: Self = Self { along: 0.0, speed: 0.0, reference: 0.0, held: 1.0, share: 1.0 };
 
-    /// Share of the demand that the rail bears.
+    /// Share of the demand that the rail can carry.
     pub(super) const fn share(&self) -> f32 {
         self.share
     }
 
-    /// One slot at a torque demand, in N·m, and a mechanical speed, in rad/s.
+    /// One slot with a torque demand, in N·m, and a mechanical speed, in rad/s.
     #[inline(never)]
     pub(super) fn step(&mut self, torque_nm: f32, speed: f32, settings: &Settings) {
         let Settings { ratings, slot_s, train, .. } = *settings;
@@ -113,8 +113,8 @@ mod tests {
         }
     }
 
-    /// The least share of a torque's direction at a mechanical speed, in rad/s, with an angle that is off so often a turn, by so much in electrical rad, and followed
-    /// at once. Torque comes some time after the first angle.
+    /// The least share for a torque's direction at a mechanical speed, in rad/s, with an angle that is off this many times a turn, by this many
+    /// electrical rad, and that is followed at once. Torque comes some time after the first angle.
     fn least_share(torque: f32, speed: f32, (order, off_rad): (f32, f32)) -> f32 {
         let settings = settings();
         let (mut grip, mut least) = (Grip::FULL, 1.0_f32);
@@ -128,7 +128,7 @@ mod tests {
         least
     }
 
-    /// An angle that is off once or twice a turn is no slip at any speed at which a slot sees each half turn of its error.
+    /// An angle error once or twice a turn is not taken for slip at any speed at which a slot sees each half turn of the error.
     #[test]
     fn an_angle_that_is_off_is_no_slip() {
         let off_rad = 3.0_f32.to_radians();
@@ -151,21 +151,22 @@ mod tests {
         }
     }
 
-    /// Slip takes its share at once and goes on taking while it lasts; below the free slip nothing is taken. Speeds are shares of the largest.
+    /// Slip reduces the share at once and goes on reducing it while it lasts; slip below the free limit reduces nothing. Speeds are shares of the
+    /// largest.
     #[test]
     fn slip_takes_its_share_at_once_and_more_while_it_lasts() {
         let settings = settings();
         let largest = settings.ratings.max_speed_rad_s;
         for (torque, speed) in WAYS {
-            // The rotor jumps ahead by a slip: half of the span beyond what is free.
+            // The rotor jumps ahead by a slip: half of the span beyond the free slip.
             let ahead = |slip: f32| speed * 200.0 + torque * slip * largest;
             let mut grip = Grip::FULL;
-            // The speed whose smoothed value is the one that is wanted.
+            // The speed whose smoothed value is the wanted one.
             let step = |grip: &mut Grip, torque_nm: f32, wanted: f32| {
                 let speed = grip.speed + (wanted - grip.speed) * (1.0 + SMOOTHED_S / settings.slot_s);
                 grip.step(torque_nm, speed, &settings);
             };
-            // What was faster before is forgotten: the reference comes down with the rotor.
+            // Earlier, higher speed is forgotten: the reference comes down with the rotor.
             for slip in [0.1, 0.0] {
                 step(&mut grip, torque * 800.0, ahead(slip));
                 assert_eq!(grip.share(), 1.0);
@@ -179,7 +180,7 @@ mod tests {
             step(&mut grip, torque * 800.0, ahead(FREE + 0.5 * SPAN + 2.0 * followed));
             let held = held - 0.5 * 1e-3 / LOSE_S;
             assert!((grip.share() - (held - 0.5)).abs() < 2e-3, "{}", grip.share());
-            // Just free: all of it comes back but what is held, and that by a thousandth a slot.
+            // Just within the free slip: everything returns except the held part, which returns by a thousandth a slot.
             step(&mut grip, torque * 800.0, ahead(0.99 * FREE));
             assert!((grip.share() - (held + 1e-3 / RESTORE_S)).abs() < 1e-5, "{}", grip.share());
             // The torque's other direction has its own reference: it begins where the rotor is.

@@ -1,17 +1,16 @@
-//! The conditions for the gates to come on, and for a fault to be left: sensors, gate drivers, link, configuration,
-//! contactors.
+//! The conditions for turning the gates on, and for leaving a fault: sensors, gate drivers, link, configuration, contactors.
 
 use super::{Configuration, Settings, Situation};
 use crate::protection::{self, FailedCheck, Fault, SafeState};
 
-/// Share of the largest current that a current sensor may show where no current flows.
+/// Share of the largest current that a current sensor may show when no current flows.
 const OFFSET_SHARE: f32 = 0.02;
-/// Share of it that may flow while the gates are off.
+/// Share of the largest current that may flow while the gates are off.
 const RESTING_SHARE: f32 = 0.05;
 /// Share of the nominal voltage by which an empty link may be measured as negative.
 const NEGATIVE_LINK_SHARE: f32 = 0.02;
 
-/// The first thing that is not in order while the gates are off; `main_closed` is what the main contactor was told.
+/// The first thing that is not in order while the gates are off; `main_closed` is the order given to the main contactor.
 #[inline(never)]
 pub(super) fn cause(input: &Situation, main_closed: bool, settings: &Settings) -> Option<FailedCheck> {
     hardware(input)
@@ -23,7 +22,7 @@ pub(super) fn cause(input: &Situation, main_closed: bool, settings: &Settings) -
         .or_else(|| if settings.line.is_some() { contactors(input, main_closed, false) } else { None })
 }
 
-/// Gate drivers, whatever else holds the gates off, and temperatures.
+/// Gate drivers, any other cause that holds the gates off, and temperatures.
 pub(super) fn hardware(input: &Situation) -> Option<FailedCheck> {
     let feedback = input.feedback;
     if let Some(fault) = feedback.hardware {
@@ -52,7 +51,7 @@ fn current_sensors(input: &Situation, settings: &Settings) -> Option<FailedCheck
     None
 }
 
-/// No current flows: for where the gates have been off for a while.
+/// The check that no current flows, for use after the gates have been off for a while.
 #[inline(never)]
 pub(super) fn resting_current(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     let (ratings, observed) = (settings.ratings, input.observed);
@@ -63,7 +62,8 @@ pub(super) fn resting_current(input: &Situation, settings: &Settings) -> Option<
     is_beyond(current, resting_a).then_some((Fault::CurrentOffset, current, resting_a))
 }
 
-/// The current of a machine that is shorted is one that its EMF drives through its resistance, else it turns faster than its sensor says.
+/// The check of a shorted machine: its current is the one that its EMF drives through its resistance; otherwise the machine turns faster than its
+/// sensor says.
 pub(super) fn shorted_current(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     let (ratings, observed) = (settings.ratings, input.observed);
     let driven_a = observed.emf_omega.abs() * ratings.magnet_flux_wb / ratings.stator_resistance_ohm;
@@ -71,7 +71,7 @@ pub(super) fn shorted_current(input: &Situation, settings: &Settings) -> Option<
     is_beyond(observed.current_a, limit_a).then_some((Fault::CurrentOffset, observed.current_a, limit_a))
 }
 
-/// Not a number is beyond everything.
+/// `true` if a value exceeds a limit or is not a number.
 fn is_beyond(value: f32, limit: f32) -> bool {
     value.is_nan() || value > limit
 }
@@ -85,25 +85,25 @@ fn link(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     (udc_v > ratings.trip_dc_over_v).then_some((Fault::DcOvervoltage, udc_v, ratings.trip_dc_over_v))
 }
 
-/// The sensor answers; at standstill its speed settles at zero, turning at a speed.
+/// The check that the sensor answers; at standstill its speed settles at zero, when turning at a speed.
 pub(super) fn position(input: &Situation) -> Option<FailedCheck> {
     let alive = input.feedback.sensor_alive && input.observed.omega.is_finite();
     (!alive).then_some((Fault::PositionSensor, 0.0, 1.0))
 }
 
-/// Below the overspeed trip.
+/// The check against the overspeed trip.
 fn speed(input: &Situation, settings: &Settings) -> Option<FailedCheck> {
     protection::check_speed(input.observed.omega, settings.ratings)
 }
 
-/// `true` if the machine's EMF stays below a link of nominal voltage with the gates off: faster, the diodes would rectify it.
+/// `true` if the machine's EMF stays below a link of nominal voltage with the gates off; at a higher speed the diodes would rectify it.
 #[inline(never)]
 pub(super) fn open_is_safe(input: &Situation, settings: &Settings) -> bool {
     let (emf_omega, nominal_v) = (input.observed.emf_omega, settings.ratings.dc_link_nominal_v);
     protection::safe_state(emf_omega, nominal_v, settings.ratings) == SafeState::GatesOff
 }
 
-/// The first of the conditions that is not kept while the gates may pulse.
+/// The first condition that is violated while the gates may pulse.
 #[inline(never)]
 pub(super) fn while_pulsing(input: &Situation, main_closed: bool) -> Option<FailedCheck> {
     hardware(input)
@@ -115,7 +115,7 @@ pub(super) fn while_pulsing(input: &Situation, main_closed: bool) -> Option<Fail
         .or_else(|| if main_closed { contactors(input, true, false) } else { None })
 }
 
-/// Contactors do what they were told.
+/// The check that the contactors follow their orders.
 #[inline(never)]
 pub(super) fn contactors(
     input: &Situation,

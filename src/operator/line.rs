@@ -5,9 +5,9 @@ use super::settings::Line;
 use super::{Settings, Situation, Switches};
 use crate::protection::{FailedCheck, Fault};
 
-/// Time constants after which charging or discharging has failed.
+/// Number of time constants after which charging or discharging has failed.
 const TOO_LONG: f32 = 10.0;
-/// Share of the nominal voltage that may be left between source and link when the main contactor closes.
+/// Difference between source and link, as a share of the nominal voltage, that may remain when the main contactor closes.
 const GAP_SHARE: f32 = 0.02;
 /// Slots over which the link's rate is taken.
 const RATE_SLOTS: u32 = 20;
@@ -41,7 +41,7 @@ pub(super) struct Precharge {
     stage: Charging,
     /// Slots in this stage.
     slots: u32,
-    /// Link voltage when the rate was taken last, in V.
+    /// Link voltage when the rate was last taken, in V.
     before_v: f32,
 }
 
@@ -56,7 +56,7 @@ impl Precharge {
         Switches { precharge, main, discharge: false, chopper: 0.0 }
     }
 
-    /// One slot. The main contactor closes when the source is at most [`GAP_SHARE`] away: by the link's own rate times the time
+    /// One slot. The main contactor closes when the source is at most [`GAP_SHARE`] away. The distance is the link's own rate times the time
     /// constant, so the source need not be measured.
     #[inline(never)]
     pub(super) fn step(&mut self, input: &Situation, line: &Line, settings: &Settings) -> Outcome {
@@ -96,7 +96,7 @@ impl Precharge {
         *self = Self { stage, slots: 0, before_v: udc_v };
     }
 
-    /// `true` if the source is near, looked at every [`RATE_SLOTS`] slots.
+    /// `true` if the source is near; checked every [`RATE_SLOTS`] slots.
     fn is_near(&mut self, udc_v: f32, line: &Line, settings: &Settings) -> bool {
         if !self.slots.is_multiple_of(RATE_SLOTS) {
             return false;
@@ -110,7 +110,7 @@ impl Precharge {
 /// Discharging the link: contactors open, then the resistor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Discharge {
-    /// Both contactors are open, by their own contacts.
+    /// `true` once both contactors are open according to their own contacts.
     open: bool,
     slots: u32,
 }
@@ -120,7 +120,7 @@ impl Discharge {
         Self { open: false, slots: 0 }
     }
 
-    /// The resistor is never on the link while a contactor may be closed.
+    /// The resistor is never connected to the link while a contactor may be closed.
     pub(super) const fn switches(&self) -> Switches {
         Switches { precharge: false, main: false, discharge: self.open, chopper: 0.0 }
     }
@@ -152,7 +152,7 @@ impl Discharge {
     }
 }
 
-/// The chopper's duty at a link voltage: a straight line between its two levels. A voltage that is no number calls for nothing.
+/// The chopper's duty at a link voltage: a straight line between its two levels. A voltage that is not a number gives none.
 pub(super) fn chopper(udc_v: f32, line: &Line) -> f32 {
     if udc_v >= line.chopper_full_v {
         1.0

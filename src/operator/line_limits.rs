@@ -1,8 +1,8 @@
-//! The torque that limits of line current and line power leave.
+//! The torque that the limits of line current and line power allow.
 //!
-//! The line's power is the shaft's and the copper loss: `P = ω T + k T²`, with `k` from the currents that flow, the pulses' ripple included: at a sixth of
-//! the largest torque that of three pulses a turn is nearly as much again. Solved for the
-//! torque, so that no loop closes over the loss; at the limit, where it counts, `k T²` is the loss itself. Inverter, iron and auxiliaries are not in it.
+//! The line's power is the shaft's power plus the copper loss: `P = ω T + k T²`, with `k` from the currents that flow, the pulses' ripple included:
+//! at a sixth of the largest torque the ripple loss of three pulses a turn is nearly as much again. The equation is solved for the torque, so that no
+//! loop closes over the loss; at the limit, where it counts, `k T²` is the loss itself. Inverter, iron and auxiliaries are not included.
 
 use super::{Settings, TrainLimits};
 use crate::frames::{limit, sqrt};
@@ -10,23 +10,23 @@ use crate::machine::Ratings;
 use crate::ports::Report;
 use crate::thermal::copper_w;
 
-/// Time constant of the link voltage and of the loss, in s: slower than the swing of a usual line filter, which is not the line's.
+/// Time constant of the link voltage and of the loss, in s: slower than the swing of a usual line filter, which is not a property of the line.
 const SMOOTH_S: f32 = 0.05;
-/// Time from a speed to the torque that follows from it, in s: two slots, and a carrier's half.
+/// Delay from a speed to the torque that follows from it, in s: two slots, and a carrier half.
 const FOLLOWS_S: f32 = 3e-3;
-/// Share of the largest torque below which the loss is taken as that torque's: of weakening currents there is one without torque.
+/// Share of the largest torque below which the loss is attributed to that torque: weakening currents cause a loss without torque.
 const LEAST_SHARE: f32 = 0.1;
-/// Share of the nominal voltage below which the line's current falls, to nothing at the lowest operating voltage.
+/// Share of the nominal voltage below which the permitted line current falls, to zero at the lowest operating voltage.
 const FULL_SHARE: f32 = 0.9;
 
-/// The line as the link shows it, and the drive's losses.
+/// The line as seen through the link, and the drive's losses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Drawn {
     /// Link voltage, in V; 0 while it is not known.
     udc_v: f32,
     /// Copper loss over the torque's square, in W/(N·m)².
     loss: f32,
-    /// Mechanical speed, in rad/s: a ramp is ahead of it by its acceleration times [`SMOOTH_S`].
+    /// Mechanical speed, smoothed, in rad/s: a ramp is ahead of it by its acceleration times [`SMOOTH_S`].
     speed: f32,
 }
 
@@ -54,7 +54,7 @@ impl Drawn {
         self.speed += share * (omega / ratings.pole_pairs - self.speed);
     }
 
-    /// The torques that the limits leave at a mechanical speed, in rad/s: at the one that a ramp has come to when they take effect.
+    /// The torques that the limits allow at a mechanical speed, in rad/s, extrapolated to the speed of a ramp when they take effect.
     #[inline(never)]
     pub(super) fn most(&self, speed: f32, ratings: &Ratings, limits: &TrainLimits) -> Most {
         let TrainLimits { motoring_a, braking_a, motoring_w, braking_w, .. } = *limits;
@@ -71,7 +71,7 @@ impl Drawn {
     }
 }
 
-/// The power that is allowed, in W: the lower of that of the current and of the limit itself; `None` without a limit.
+/// The permitted power, in W: the lower of the current limit's power and the power limit itself; `None` without a limit.
 fn lower(
     (limit_a, no_limit_a, current_w): (f32, f32, f32),
     (limit_w, no_limit_w): (f32, f32),
@@ -87,8 +87,8 @@ fn motoring_share(udc_v: f32, ratings: &Ratings) -> f32 {
     if span_v > 0.0 { limit((udc_v - none_v) / span_v, 0.0, 1.0) } else { 1.0 }
 }
 
-/// The torque at which the line's power is `power_w`: of `ω T + k T² = P` the positive root. Without one the loss takes all that is braked: no
-/// limit. Of a power that is no number: no torque.
+/// The torque at which the line's power is `power_w`: the positive root of `ω T + k T² = P`. Without a root the loss absorbs all of the braking
+/// power: no limit. A power that is not a number gives no torque.
 fn torque_nm(power_w: f32, speed: f32, loss: f32) -> f32 {
     let square = speed * speed + 4.0 * loss * power_w;
     if loss < 0.0 && square <= 0.0 {
@@ -107,7 +107,7 @@ mod tests {
 
     const LIMITS: TrainLimits = TrainLimits { motoring_a: 100.0, braking_w: 90e3, ..TrainLimits::NONE };
 
-    /// Of a speed that stays.
+    /// For a constant speed.
     fn drawn(udc_v: f32, speed: f32) -> Drawn {
         Drawn { udc_v, loss: 4e-3, speed }
     }
@@ -133,7 +133,7 @@ mod tests {
         }
     }
 
-    /// A speed that has risen evenly is the one that it will be.
+    /// A speed that has risen evenly is extrapolated to the speed that it will reach.
     #[test]
     fn a_ramp_is_looked_ahead_of() {
         let acceleration = 150.0;
@@ -158,8 +158,8 @@ mod tests {
         assert_eq!(drawn(f32::NAN, 300.0).most(300.0, ratings, &LIMITS).motoring_nm, 0.0);
     }
 
-    /// The first slot takes over what there is, every later one a part in 51; the loss is that of the present currents, at a tenth of the
-    /// largest torque at least.
+    /// The first slot adopts the present values, every later one a part in 51; the loss is that of the present currents, at a tenth of the largest
+    /// torque at least.
     #[test]
     fn the_line_and_the_loss_are_smoothed() {
         let ratings = &BUILT_IN.ratings;
@@ -213,13 +213,13 @@ mod tests {
         ] {
             assert_eq!(most(limits), Most { motoring_nm, braking_nm }, "{limits:?}");
         }
-        // Braking takes what the line bears, whatever its voltage.
+        // Braking uses the full line limit, whatever the line's voltage.
         let limits = TrainLimits { motoring_a: 20.0, braking_a: 20.0, ..none };
         let Most { motoring_nm, braking_nm } = free(1_000.0, 200.0).most(200.0, ratings, &limits);
         assert_eq!((motoring_nm, braking_nm), (0.0, 100.0));
     }
 
-    /// The positive root of `ω T + k T² = P`, and what there is where there is none.
+    /// The positive root of `ω T + k T² = P`, and the result if there is none.
     #[test]
     fn the_torque_of_a_power_is_the_positive_root() {
         // 100 T + 4 T² = 600 at 5; 100 T − 4 T² = 400 at 5; at rest 4 T² = 100.
@@ -241,7 +241,7 @@ mod tests {
         }
     }
 
-    /// Of a machine whose lowest voltage is where the current would begin to fall, it does not fall.
+    /// The current does not fall for a machine whose lowest voltage is where it would begin to fall.
     #[test]
     fn without_a_span_the_current_does_not_fall() {
         let nominal_v = BUILT_IN.ratings.dc_link_nominal_v;
@@ -251,7 +251,7 @@ mod tests {
         }
     }
 
-    /// At once where nothing is known, then with its time constant.
+    /// At once if nothing is known, then with its time constant.
     #[test]
     fn what_is_drawn_follows_link_loss_and_speed() {
         let settings = Settings::rated(&BUILT_IN.ratings, 1e-3, None);
@@ -272,7 +272,7 @@ mod tests {
         near(drawn.udc_v, 1_500.0 - 100.0 * share);
         near(drawn.loss, copper_w / 160e3 + share * (copper_w / 90e3 - copper_w / 160e3));
         near(drawn.speed, 50.0 + 10.0 * share);
-        // Of little torque as of a tenth of the largest.
+        // A small torque counts as a tenth of the largest.
         let mut idle = Drawn::UNKNOWN;
         idle.step(&report(1_500.0, 1.0, 0.0), &settings);
         let least_nm = 0.1 * ratings.max_torque_nm;

@@ -1,4 +1,4 @@
-//! The state machine, one for every drive: its states, what ends them, what goes on by itself, and what comes out.
+//! The state machine, one for every drive: its states, the conditions that end them, automatic transitions, and outputs.
 
 mod commands;
 
@@ -32,7 +32,7 @@ enum Phase {
     Discharge(Discharge),
     Fault {
         trip: Trip,
-        /// Slots since the acknowledge was handed on; `None` before.
+        /// Slots since the acknowledge was passed on; `None` before.
         asked: Option<u32>,
     },
 }
@@ -44,17 +44,17 @@ pub struct Operator<D> {
     demands: D,
     /// The last request's levels, for edges.
     last: Edges,
-    /// The fault in the values of the request that is repeated.
+    /// The fault in the values of the request that keeps being repeated.
     bad_values: Option<Refusal>,
     refusal: Option<Refusal>,
     refusals: u32,
-    /// Number of the last acknowledge that was handed on.
+    /// Number of the last acknowledge that was passed on.
     acknowledge: u8,
     thermal: ThermalState,
     temperatures: Option<Temperatures>,
 }
 
-/// Levels whose rise is a command.
+/// Levels whose rising edge is a command.
 #[derive(Clone, Copy, Debug)]
 struct Edges {
     enable: bool,
@@ -64,12 +64,12 @@ struct Edges {
 }
 
 impl<D: Demands> Operator<D> {
-    /// At power-up.
+    /// The state at power-up.
     pub const fn new() -> Self {
         Self {
             phase: Phase::Init,
             demands: D::AT_REST,
-            // A level that stands from the beginning is no edge.
+            // A level that is set from the beginning is not an edge.
             last: Edges { enable: true, charge: true, discharge: true, acknowledge: true },
             bad_values: None,
             refusal: None,
@@ -129,7 +129,7 @@ impl<D: Demands> Operator<D> {
         }
     }
 
-    /// The temperatures' slot, and the first failed that lasts.
+    /// The temperatures' slot; returns the first failed check that persists.
     #[inline(never)]
     fn warm(&mut self, seen: &Seen, feedback: &Feedback, settings: &Settings) -> Option<FailedCheck> {
         let thermal = settings.thermal.filter(|_| D::DERATES)?;
@@ -151,7 +151,7 @@ impl<D: Demands> Operator<D> {
         self.refusals = self.refusals.wrapping_add(1);
     }
 
-    /// Takes over limits that are good; what is wrong is refused once, not in every slot in which it is repeated.
+    /// Adopts valid limits; a wrong value is refused once, not in every slot in which it is repeated.
     fn look_at_values(&mut self, request: &D::Request, settings: &Settings) {
         let wrong = D::wrong_with(request, settings);
         match wrong {
@@ -179,7 +179,7 @@ impl<D: Demands> Operator<D> {
         self.demands.drop();
     }
 
-    /// Ends a state whatever is asked: by the drive's faults, by the board's feedback, by the link.
+    /// Ends a state regardless of the request: because of the drive's faults, the board's feedback, or the link.
     #[inline(never)]
     fn supervise(&mut self, input: &Situation, settings: &Settings) {
         if matches!(self.phase, Phase::Fault { .. }) {
@@ -207,7 +207,7 @@ impl<D: Demands> Operator<D> {
         }
     }
 
-    /// Steps of the state that come by themselves.
+    /// Transitions of the state that happen by themselves.
     fn advance(&mut self, input: &Situation, settings: &Settings) {
         match &mut self.phase {
             Phase::Init => {
@@ -218,7 +218,7 @@ impl<D: Demands> Operator<D> {
             Phase::SelfTest { slots } => {
                 *slots = slots.saturating_add(1);
                 if *slots as f32 * settings.slot_s >= SELF_TEST_S {
-                    // A position that is not known yet has no speed; the drive cannot be enabled before it is.
+                    // A position that is not known yet gives no speed; the drive cannot be enabled before it is known.
                     if input.observed.speed_known || !input.feedback.position_known {
                         self.phase = Phase::Ready;
                     } else {
@@ -248,7 +248,7 @@ impl<D: Demands> Operator<D> {
         }
     }
 
-    /// The state after a step of a sequence on the line's side, which ends in `done`; without a line there is none.
+    /// The state after a step of a sequence on the line's side, which ends in `done`; without a line there is no sequence.
     fn switch(&mut self, outcome: Option<Outcome>, done: Phase, input: &Situation) {
         match outcome {
             Some(Outcome::Going) => {}
@@ -258,7 +258,7 @@ impl<D: Demands> Operator<D> {
         }
     }
 
-    /// The drive's answer to an acknowledge: its cause is gone, or stays; without one the fault stays as well.
+    /// The drive's answer to an acknowledge: the cause is gone, or remains; without an answer the fault remains as well.
     fn await_release(&mut self, trip: Trip, waited_s: f32, input: &Situation) {
         let answered = input.observed.acknowledged == self.acknowledge;
         let again = match input.observed.trip {

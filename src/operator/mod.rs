@@ -1,13 +1,13 @@
 //! The permission to pulse: the state machine between those who command and the drive.
 //!
-//! init → self-test → ready → precharge → charged → enabled → running, with coasting, stopping, discharge and fault. Gates
-//! come on by an explicit edge only; a fault is left by an acknowledge and with a healthy cause only; a command that is not followed
-//! has a reason.
+//! init → self-test → ready → precharge → charged → enabled → running, with coasting, stopping, discharge and fault. Gates come on only by an
+//! explicit edge; a fault is left only by an acknowledge, and only if its cause is gone; every command that is not followed has a reason.
 //!
-//! One pure step per slot of a millisecond, a whole number of control periods, in the idle loop: what it looks at is the drive's word of the slot's
-//! beginning, what it decides holds from the next slot's beginning on ([`Mailboxes`](crate::drive::Mailboxes)). So when the idle loop really ran changes nothing.
+//! One pure step per slot of a millisecond, a whole number of control periods, in the idle loop: its input is the drive's report from the slot's
+//! beginning, and its decision holds from the next slot's beginning on ([`Mailboxes`](crate::drive::Mailboxes)). So it makes no difference when the
+//! idle loop really ran.
 //!
-//! The drive's own protection does not wait for any of this: it trips in its interrupts, and tells.
+//! The drive's own protection does not wait for any of this: it trips in its interrupts, and reports.
 
 #![forbid(unsafe_code)]
 
@@ -53,12 +53,12 @@ pub fn slot_s(clock: &Clock) -> f32 {
     clock.millisecond_periods() as f32 * clock.control_s()
 }
 
-/// Time for which everything must be in order in the self-test, in s.
+/// Time for which everything must be in order during the self-test, in s.
 const SELF_TEST_S: f32 = 0.05;
-/// Longest time in which both interrupts carry out an acknowledge, in s.
+/// Longest time for both interrupts to carry out an acknowledge, in s.
 const ACKNOWLEDGE_S: f32 = 0.05;
 
-/// Everything that a step works on.
+/// The inputs of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a, Q = Request, R = Report> {
     /// The request.
@@ -69,12 +69,12 @@ pub struct Input<'a, Q = Request, R = Report> {
     pub feedback: &'a Feedback,
 }
 
-/// Everything that the state machine itself works on, of whatever drive.
+/// The inputs of the state machine itself, for any drive.
 #[derive(Clone, Copy, Debug)]
 struct Situation<'a> {
     observed: &'a Seen,
     feedback: &'a Feedback,
-    /// The first failed of the temperatures and their sensors.
+    /// The first failed check of the temperatures and their sensors.
     thermal: Option<FailedCheck>,
 }
 

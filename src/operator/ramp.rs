@@ -1,5 +1,5 @@
-//! The torque demand's way: limited in its rate (slew) and in how fast the rate changes (jerk). What passengers and couplings feel
-//! is shaped here; the drive's own slew limit behind it is the inverter's.
+//! The torque demand's path: limited in its rate (slew) and in how fast the rate changes (jerk). This shaping is for passengers and couplings; the
+//! drive's own slew limit after it is for the inverter.
 
 use super::Settings;
 use crate::frames::{limit, sqrt};
@@ -16,7 +16,7 @@ pub struct Rates {
 }
 
 impl Rates {
-    /// Those of the settings.
+    /// The rates of the settings.
     #[inline]
     pub(super) const fn of(settings: &Settings) -> Self {
         let Settings { slot_s, slew_nm_s, jerk_nm_s2, .. } = *settings;
@@ -24,7 +24,7 @@ impl Rates {
     }
 }
 
-/// The demand on its way.
+/// The demand on its way to the target.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ramp {
     torque_nm: f32,
@@ -47,14 +47,14 @@ impl Ramp {
         self.torque_nm
     }
 
-    /// One step towards a target, in N·m. The target is reached exactly; it is passed only where it came nearer, or turned
-    /// back, faster than the jerk limit lets the rate follow.
+    /// One step towards a target, in N·m. The target is reached exactly. It is overshot only if it came nearer, or turned back, faster than the jerk
+    /// limit lets the rate follow.
     #[inline(never)]
     pub fn step(&mut self, target_nm: f32, rates: &Rates) -> f32 {
         let Rates { step_s, slew_nm_s, jerk_nm_s2 } = *rates;
         let change = jerk_nm_s2 * step_s;
         let error = target_nm - self.torque_nm;
-        // The largest rate from which whole steps of the jerk lead to rest within what is left: r²/2j + r·dt/2 = |error|.
+        // The largest rate from which whole steps of the jerk lead to rest within the remaining error: r²/2j + r·dt/2 = |error|.
         let able = change * (sqrt(0.25 + 2.0 * error.abs() / (change * step_s)) - 0.5);
         let rate = if able < slew_nm_s { able } else { slew_nm_s };
         let wanted = if error < 0.0 { -rate } else { rate };
@@ -62,7 +62,7 @@ impl Ramp {
         self.rate_nm_s = limit(wanted, self.rate_nm_s - change, self.rate_nm_s + change);
         self.torque_nm += self.rate_nm_s * step_s;
         let passed = (target_nm - self.torque_nm) * error <= 0.0;
-        // Landing on it is a step at the rate that just takes it there, and rest after it.
+        // Landing on the target takes one step at exactly the rate that leads there, and rest after it.
         let landing_nm_s = error / step_s;
         let softly = landing_nm_s.abs() <= 2.0 * change && (landing_nm_s - before_nm_s).abs() <= 2.0 * change;
         if passed && softly {
@@ -77,11 +77,11 @@ mod tests {
     use super::*;
 
     const RATES: Rates = Rates { step_s: 1e-3, slew_nm_s: 9_880.0, jerk_nm_s2: 197_600.0 };
-    /// Change of the rate in a step, and what a step at that rate adds.
+    /// Change of the rate in a step, and the torque that a step at that rate adds.
     const CHANGE_NM_S: f32 = RATES.jerk_nm_s2 * RATES.step_s;
     const STEP_NM: f32 = CHANGE_NM_S * RATES.step_s;
 
-    /// A step towards 100 N·m from so far below it, at a rate; both in changes of the rate. Returns the torque and the rate after it.
+    /// A step towards 100 N·m from this far below it, at a rate; both in changes of the rate. Returns the torque and the rate after it.
     fn stepped(below: f32, rate: f32) -> (f32, f32) {
         let mut ramp = Ramp { torque_nm: 100.0 - below * STEP_NM, rate_nm_s: rate * CHANGE_NM_S };
         let torque_nm = ramp.step(100.0, &RATES);
@@ -89,16 +89,16 @@ mod tests {
         (torque_nm, ramp.rate_nm_s / CHANGE_NM_S)
     }
 
-    /// Landing ends the rate in two steps of the jerk: the step's own rate is no larger than both, and no farther from the rate before.
+    /// Landing ends the rate in two steps of the jerk: the step's own rate is at most both of them, and no farther than that from the rate before.
     #[test]
     fn a_ramp_lands_where_two_steps_of_the_jerk_suffice() {
-        // On the target already; passing it; at a rate that is not quite gone.
+        // Already on the target; passing it; at a rate that is not quite gone.
         for (below, rate) in
             [(0.0, 0.0), (0.0, 1.5), (0.0, -1.5), (0.5, 2.3), (1.5, 3.0), (1.9, 3.8), (-0.5, -2.3)]
         {
             assert_eq!(stepped(below, rate), (100.0, 0.0), "{below} {rate}");
         }
-        // Too quick: it passes, slows down as the jerk allows, and comes back.
+        // Too fast: it passes, slows down as the jerk allows, and comes back.
         for (below, rate) in [(0.5, 2.7), (0.0, 2.2), (2.1, 3.5), (0.5, 5.0)] {
             let (torque_nm, after) = stepped(below, rate);
             assert!(

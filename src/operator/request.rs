@@ -9,8 +9,8 @@ use crate::protection::{Fault, Trip};
 use crate::thermal::Ratios;
 use crate::time::Instant;
 
-/// The request of the command's sender, as levels: a frame that is lost or repeated changes nothing. Where a command is an edge, it is
-/// the change from `false` to `true` between two steps; at power-up every level counts as having been `true`.
+/// The request of the command's sender, as levels: a lost or repeated frame changes nothing. If a command is an edge, the edge is the change from
+/// `false` to `true` between two steps; at power-up every level counts as having been `true`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Request {
@@ -18,9 +18,9 @@ pub struct Request {
     pub enable: bool,
     /// The permission for the enabling edge to come with a torque demand other than zero.
     pub with_torque: bool,
-    /// `true`: gates off at once, without a ramp; as a stop it needs a new enabling edge.
+    /// `true`: gates off at once, without a ramp; like a stop it needs a new enabling edge afterwards.
     pub off: bool,
-    /// `true`: torque ramped to zero, then gates off, the drive stays enabled; `false` again: the machine is caught.
+    /// `true`: torque ramped to zero, then gates off, while the drive stays enabled; `false` again: the machine is caught.
     pub coast: bool,
     /// Rising edge: precharge the link and close the main contactor.
     pub charge: bool,
@@ -35,7 +35,7 @@ pub struct Request {
 }
 
 impl Request {
-    /// Nothing wanted, limits as rated.
+    /// A request for nothing, with limits as rated.
     pub const fn idle(ratings: &Ratings) -> Self {
         Self {
             enable: false,
@@ -72,7 +72,7 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// Nothing wanted.
+    /// No level set.
     pub const NONE: Self = Self {
         enable: false,
         with_torque: false,
@@ -84,8 +84,8 @@ impl Levels {
     };
 }
 
-/// Limits that the command's sender may set, each within the machine's ratings: outside of them they are refused, and the limits
-/// that held before go on.
+/// Limits that the command's sender may set, each within the machine's ratings: limits outside them are refused, and the previous limits remain in
+/// force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
@@ -102,8 +102,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// As the machine is rated: braking ends between the link's highest operating voltage and its trip level, motoring between its
-    /// lowest one and that trip level.
+    /// The limits as the machine is rated: braking ends between the link's highest operating voltage and its trip level, motoring between its lowest
+    /// one and that trip level.
     pub const fn rated(ratings: &Ratings) -> Self {
         let ends = Ends::rated(ratings);
         Self {
@@ -148,13 +148,13 @@ pub struct Feedback {
     pub driver_ready: bool,
     /// The input that lets the gates pulse is high.
     pub enable_input: bool,
-    /// The position sensor answers, or is one that cannot tell at standstill.
+    /// The position sensor answers, or is of a kind that cannot tell at standstill.
     pub sensor_alive: bool,
     /// The rotor's angle is known (an incremental encoder's index has passed).
     pub position_known: bool,
-    /// The position sensor counts, so that an angle that is not known is found once the drive is enabled.
+    /// The position sensor counts, so that an unknown angle can be found once the drive is enabled.
     pub position_counted: bool,
-    /// Phase currents that the sensors show at no current, in A, as found at the start.
+    /// Phase currents that the sensors show without current, in A, as found at the start.
     pub offsets_a: Abc,
     /// The configuration's check.
     pub configuration: Configuration,
@@ -162,27 +162,27 @@ pub struct Feedback {
     pub parameters_open: bool,
     /// The cause that keeps the gates off in hardware, while it lasts.
     pub hardware: Option<Fault>,
-    /// The temperature sensors' voltages; where the settings know of none, nobody looks.
+    /// The temperature sensors' voltages; ignored if the settings contain no sensors.
     pub temperatures: Ratios,
 }
 
-/// The part of an observation that every drive has.
+/// The part of an observation that is common to all drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seen {
     /// The control instant.
     pub at: Instant,
-    /// Voltage of the capacitors, in V, as the settings' ratings count it.
+    /// Voltage of the capacitors, in V, in the terms of the settings' ratings.
     pub udc_v: f32,
     /// Largest magnitude of a phase current, in A.
     pub current_a: f32,
-    /// Magnitude of the current's reference, in A; 0 where the map's error is not known.
+    /// Magnitude of the current's reference, in A; 0 if the map's error is not known.
     pub reference_a: f32,
-    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 while that is not known.
+    /// Share by which the machine's flux linkage seems to exceed the map's; 0 while that is not known.
     pub map_error: f32,
     /// Electrical angular speed, of the faster motor, in rad/s.
     pub omega: f32,
-    /// The electrical speed whose EMF the diodes see, in rad/s: of two motors the sum, because one bridge has them in series.
+    /// The electrical speed whose EMF acts on the diodes, in rad/s: for two motors the sum, because one bridge has them in series.
     pub emf_omega: f32,
     /// `true` once all speeds have been followed long enough to be used.
     pub speed_known: bool,

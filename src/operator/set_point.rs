@@ -1,15 +1,15 @@
-//! The speed demand's way. A speed that moves is told in steps, one a message. The reference does not jump from one to the next: it goes
-//! along a straight line that takes a little longer than the messages are apart, so that it neither stands between them nor turns.
+//! The speed demand's path. A changing speed is sent in steps, one per message. The reference does not jump from one step to the next: it follows a
+//! straight line that takes a little longer than the time between messages, so that it neither pauses between them nor turns back.
 
 use super::Settings;
 use crate::frames::limit;
 
 /// Time in which a speed demand goes from standstill to the largest speed, in s: the steepest line.
 const RISE_S: f32 = 0.5;
-/// Longest time that counts as the one between two messages, in s. A step after it is one for itself.
+/// Longest time that counts as the one between two messages, in s. A step after a longer one stands alone.
 const LONGEST_S: f32 = 0.02;
-/// Length of a line as a multiple of the time between messages: one that comes late finds the reference still on its way. What is left of a
-/// line then is a fifth, and of that the next time a fifth again.
+/// Length of a line as a multiple of the time between messages: if a message comes late, the reference is still moving. The remainder of a line is
+/// then a fifth, and after the next one a fifth of that again.
 const OVER: f32 = 1.25;
 
 /// The speed's reference on its way, in rad/s.
@@ -19,7 +19,7 @@ pub(super) struct SetPoint {
     target: f32,
     /// The line's slope, in rad/s².
     slope: f32,
-    /// Time since the target last moved, and the one from then back to its move before, in s, at most [`LONGEST_S`] each.
+    /// Time since the target last moved, and time between its last two moves, in s, at most [`LONGEST_S`] each.
     since_s: f32,
     before_s: f32,
 }
@@ -59,8 +59,8 @@ mod tests {
 
     const SLOT_S: f32 = 1e-3;
 
-    /// Least and largest slope of the reference, in rad/s², while a target moves by 200 rad/s² and messages are so many slots apart, again
-    /// and again; from the tenth round on.
+    /// Least and largest slope of the reference, in rad/s², while a target moves by 200 rad/s² and messages come at these intervals in slots, over
+    /// and over; from the tenth round on.
     fn slopes(gaps: &[usize]) -> (f32, f32) {
         let settings = Settings::rated(&BUILT_IN.ratings, SLOT_S, None);
         let (mut point, mut slot, mut least, mut largest) = (SetPoint::at(0.0), 0, f32::MAX, f32::MIN);

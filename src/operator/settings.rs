@@ -4,7 +4,7 @@ use super::TrainLimits;
 use crate::machine::Ratings;
 use crate::thermal::Thermal;
 
-/// Time constants of the line side.
+/// Time constants on the line side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineTimes {
@@ -14,7 +14,7 @@ pub struct LineTimes {
     pub discharge_s: f32,
 }
 
-/// The line side: what stands between the source and the link.
+/// The line side: the equipment between the source and the link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Line {
@@ -26,9 +26,9 @@ pub struct Line {
     pub contactor_s: f32,
     /// Link voltage below which it counts as empty, in V.
     pub empty_v: f32,
-    /// Link voltage at which the chopper begins, in V; none has no chopper.
+    /// Link voltage at which the chopper begins, in V; infinite without a chopper.
     pub chopper_from_v: f32,
-    /// Link voltage at which it is always on, in V, above `chopper_from_v`.
+    /// Link voltage at which the chopper is always on, in V, above `chopper_from_v`.
     pub chopper_full_v: f32,
 }
 
@@ -45,7 +45,7 @@ impl Line {
         }
     }
 
-    /// The same for a source that takes back what is braked.
+    /// The same for a source that takes back the braking energy.
     pub const fn without_chopper(self) -> Self {
         Self { chopper_from_v: f32::INFINITY, chopper_full_v: f32::INFINITY, ..self }
     }
@@ -53,28 +53,28 @@ impl Line {
 
 /// Limit of extra-low voltage, in V.
 const EXTRA_LOW_V: f32 = 60.0;
-/// Share of the lowest operating voltage that a link of extra-low voltage may be left with.
+/// Largest link voltage that counts as empty, as a share of the lowest operating voltage.
 const EMPTY_SHARE: f32 = 0.2;
 
-/// Link voltage below which it counts as empty, in V: extra-low voltage, and little beside what the machine runs on.
+/// Link voltage below which it counts as empty, in V: extra-low voltage, and low compared with the machine's operating voltage.
 const fn empty_v(ratings: &Ratings) -> f32 {
     let little_v = EMPTY_SHARE * ratings.dc_link_min_v;
     if little_v < EXTRA_LOW_V { little_v } else { EXTRA_LOW_V }
 }
 
-/// Places between the highest operating voltage (0) and the overvoltage trip (1).
+/// Positions between the highest operating voltage (0) and the overvoltage trip (1).
 const CHOPPER_FROM: f32 = 0.05;
 const CHOPPER_FULL: f32 = 0.25;
 const BRAKING_NONE: f32 = 0.6;
 const BRAKING_SPAN: f32 = 0.3;
-/// Places between the lowest operating voltage (0) and the undervoltage trip (1).
+/// Positions between the lowest operating voltage (0) and the undervoltage trip (1).
 const MOTORING_NONE: f32 = 0.5;
 
 const fn above_highest_v(ratings: &Ratings, place: f32) -> f32 {
     ratings.dc_link_max_v + place * (ratings.trip_dc_over_v - ratings.dc_link_max_v)
 }
 
-/// Link voltages that end motoring and braking as rated, and over how many volts each fades, in V.
+/// Link voltages that end motoring and braking as rated, and the spans over which each fades, in V.
 pub(super) struct Ends {
     pub motoring_none_v: f32,
     pub motoring_span_v: f32,
@@ -95,7 +95,7 @@ impl Ends {
     }
 }
 
-/// Everything that does not change while it runs.
+/// The settings that do not change during operation.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -104,13 +104,14 @@ pub struct Settings<'a> {
     pub ratings: &'a Ratings,
     /// Length of a slot, in s, above 0.
     pub slot_s: f32,
-    /// Slew rate of the torque demand, in N·m/s, above 0; below the drive's own, so that it follows.
+    /// Slew rate of the torque demand, in N·m/s, above 0; below the drive's own, so that the drive can follow.
     pub slew_nm_s: f32,
     /// Rate at which the slew rate changes, in N·m/s², above 0.
     pub jerk_nm_s2: f32,
     /// Contactors and resistors; `None`: the link is alive by itself.
     pub line: Option<Line>,
-    /// Temperature sensors, and what is known of how machine and power stage warm; `None`, and of the ZS9: nothing is, and nothing derates.
+    /// Temperature sensors, and the known thermal behaviour of machine and power stage; `None`, and always for the ZS9: nothing is known, and nothing
+    /// derates.
     pub thermal: Option<&'a Thermal>,
     /// Limits of line and acceleration.
     pub train: TrainLimits,
@@ -118,11 +119,11 @@ pub struct Settings<'a> {
 
 /// The demand's slew rate as a share of the drive's.
 const SLEW_SHARE: f32 = 0.8;
-/// Time in which the demand takes up its slew rate, in s.
+/// Time in which the demand reaches its slew rate, in s.
 const JERK_S: f32 = 0.05;
 
 impl<'a> Settings<'a> {
-    /// The usual ones for a machine.
+    /// The usual settings for a machine.
     pub const fn rated(ratings: &'a Ratings, slot_s: f32, line: Option<Line>) -> Self {
         let slew_nm_s = SLEW_SHARE * ratings.torque_slew_nm_s;
         Self {
@@ -142,7 +143,7 @@ mod tests {
     use super::*;
     use crate::built_in::traction::BUILT_IN;
 
-    /// 200 V below the lowest operating voltage it trips, and 400 V above the highest one.
+    /// Trips at 200 V below the lowest operating voltage, and 400 V above the highest one.
     const RATINGS: Ratings = Ratings {
         dc_link_min_v: 1_000.0,
         dc_link_max_v: 1_800.0,

@@ -1,4 +1,4 @@
-//! The idle loop's part: once a slot, look, step, allow, tell.
+//! The idle loop's part: once a slot, observe, step, permit, report.
 
 use super::machine::Operator;
 use super::{Demands, Feedback, Input, Output, Settings, Status};
@@ -9,17 +9,17 @@ use crate::time::{Clock, Instant};
 
 /// The port between the operator, its board and whoever commands it.
 pub trait OperatorPort<D: Demands = super::TorqueDemand> {
-    /// The request and the board's feedback in the slot that began at `at`, so many `slots` after the last one that was done.
+    /// The request and the board's feedback in the slot that began at `at`, this many `slots` after the last one done.
     fn ask(&mut self, at: Instant, slots: u32) -> (D::Request, Feedback);
-    /// Tells the status after the step, its switches to be set at `from`, or as soon as the board can; and the drive's report at the slot's
-    /// beginning, `None` of a drive that has not started.
+    /// Reports the status after the step, with its switches to be set at `from` or as soon as the board can, and the drive's report from the slot's
+    /// beginning, `None` if the drive has not started.
     fn tell(&mut self, from: Instant, status: &Status<D::Status>, report: Option<&D::Report>);
 }
 
-/// Steps that a slot makes at most: an idle loop that is away for longer is none that goes on.
+/// Steps that a slot makes at most: an idle loop that is away for longer does not count as running.
 const MOST_STEPS: u32 = 50;
 
-/// The operator with its place in time.
+/// The operator and its position in time.
 pub struct Slot<D> {
     operator: Operator<D>,
     /// The slot that was done last.
@@ -27,12 +27,12 @@ pub struct Slot<D> {
 }
 
 impl<D: Demands> Slot<D> {
-    /// At power-up.
+    /// The state at power-up.
     pub const fn new() -> Self {
         Self { operator: Operator::new(), done: None }
     }
 
-    /// As often as the idle loop likes: does the newest slot if it is not done yet. Returns whether it did one.
+    /// Does the newest slot if it is not done yet; to be called as often as the idle loop likes. Returns `true` if it did one.
     pub fn run<const COMMAND: usize, const OBSERVATION: usize>(
         &mut self,
         mailboxes: &Mailboxes<D::DriveCommand, D::Report, COMMAND, OBSERVATION>,
@@ -62,8 +62,8 @@ impl<D: Demands> Slot<D> {
         true
     }
 
-    /// A slot of a drive that has not started, `why` it has not: nothing is measured and nothing permitted, but every command is
-    /// answered. Call it once in a slot's time instead of [`Self::run`].
+    /// A slot of a drive that has not started, with the reason `why`: nothing is measured and nothing permitted, but every command is answered. To be
+    /// called once in a slot's time instead of [`Self::run`].
     pub fn refuse(
         &mut self,
         why: FailedCheck,
@@ -79,8 +79,7 @@ impl<D: Demands> Slot<D> {
         port.tell(next_slot(at, clock), &output.status, None);
     }
 
-    /// The slot of an observation. The state machine also makes the steps of slots that nobody has looked at, so that its times are the
-    /// clock's.
+    /// The slot of an observation. The state machine also makes the steps of slots that were missed, so that its times are those of the clock.
     fn step(
         &mut self,
         observed: &Observation<D::Report>,

@@ -90,9 +90,9 @@ named! {
         MachineTurning => "machine_turning",
         /// This drive has no contactors on its link.
         NoContactors => "no_contactors",
-        /// A value of the request is not a finite number; its torque counts as zero, its limits as those before.
+        /// A value of the request is not a finite number; its torque counts as zero, and its previous limits remain.
         RequestNotFinite => "request_not_finite",
-        /// A limit lies outside the machine's ratings; the limits before go on.
+        /// A limit lies outside the machine's ratings; the previous limits remain in force.
         LimitOutOfRange => "limit_out_of_range",
     }
 }
@@ -139,7 +139,7 @@ pub struct Status<T = f32> {
     pub torque_nm: T,
     /// The contactors and resistors that are switched.
     pub switches: Switches,
-    /// The temperatures, where the settings know of their sensors. They are not among the status's words: the protocol tells them.
+    /// The temperatures, if the settings contain their sensors. They are not among the status's words; the protocol sends them.
     pub temperatures: Option<Temperatures>,
 }
 
@@ -168,7 +168,7 @@ impl DemandWords for f32 {
     }
 }
 
-/// Bits of the first word's lowest place that say what the demands are: the last bit of a mantissa is nothing to a demand.
+/// Bits in the first word's lowest place that give the kind of the demands: the last bit of a mantissa does not matter to a demand.
 impl DemandWords for [MotorDemand; 2] {
     fn to_words(self) -> [u32; 2] {
         self.map(|demand| match demand {
@@ -197,7 +197,7 @@ impl<T: DemandWords> Status<T> {
         [codes, refusals, first, second, chopper.to_bits(), fault, value, limit, at]
     }
 
-    /// The inverse of [`Self::to_words`]; `None` for words that are none of ours.
+    /// The inverse of [`Self::to_words`]; `None` for words that are not ours.
     pub fn from_words(words: [u32; 9]) -> Option<Self> {
         let [codes, refusals, first, second, chopper, trip @ ..] = words;
         let [state, refusal, flags, _] = codes.to_le_bytes();
@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(Status::<f32>::from_words([0xFE; 9]), None);
     }
 
-    /// Its kind takes the place of a mantissa's last bit, set or not.
+    /// The kind of a demand replaces the last bit of a mantissa, whether that bit is set or not.
     #[test]
     fn a_demand_keeps_its_kind_whatever_its_last_bit_is() {
         let even = 0x42D1_0000;

@@ -1,4 +1,4 @@
-//! The limits of a train: what it may take from its line and give back, and how fast it can accelerate.
+//! The limits of a train: the current and the power that it may take from its line and give back, and how fast it can accelerate.
 
 use crate::cell::Words;
 
@@ -6,7 +6,7 @@ use crate::cell::Words;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TrainLimits {
-    /// Largest line current while motoring, in A; less on a line that sags.
+    /// Largest line current while motoring, in A; less when the line's voltage sags.
     pub motoring_a: f32,
     /// Largest line current while braking, in A.
     pub braking_a: f32,

@@ -9,9 +9,9 @@ use crate::protection::Fault;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MotorDemand {
-    /// Give a torque.
+    /// A torque.
     Torque(Demand),
-    /// Keep to a mechanical speed, in rad/s.
+    /// A mechanical speed to hold, in rad/s.
     Speed(f32),
 }
 
@@ -21,7 +21,8 @@ pub enum MotorDemand {
 pub struct DualSample {
     /// Phase currents, positive into the motor, in A.
     pub currents_a: [Abc; 2],
-    /// Rotor angles, electrical, of sensors that count the middle of the count; `None` while one is not known, or no longer: the sensor itself has lost its rotor.
+    /// Rotor angles, electrical, of sensors that count the middle of the count; `None` while an angle is not yet known, or if the sensor itself has
+    /// lost its rotor.
     pub angles: [Option<Angle>; 2],
     /// Capacitor voltage, mean of both, in V.
     pub capacitor_v: f32,
@@ -53,9 +54,9 @@ pub struct DualDriveCommand {
     pub enable: bool,
     /// The demands on the motors.
     pub demands: [MotorDemand; 2],
-    /// Largest torques that speed demands may take, in N·m; the machine's own holds as well.
+    /// Largest torques that speed demands may use, in N·m; the machine's own limit holds as well.
     pub speed_torque_nm: [f32; 2],
-    /// Link voltage wanted outside shoot-through, U_in*, in V; 0 leaves it to the board.
+    /// Desired link voltage outside shoot-through, U_in*, in V; 0 leaves it to the board.
     pub link_ref_v: f32,
     /// The place of the zero vectors.
     pub scheme: Scheme,
@@ -64,7 +65,7 @@ pub struct DualDriveCommand {
 }
 
 impl DualDriveCommand {
-    /// Nothing.
+    /// No demand.
     pub const NONE: Self = Self {
         enable: false,
         demands: [MotorDemand::Torque(Demand { torque_nm: 0.0, slew_limited: true }); 2],
@@ -74,10 +75,10 @@ impl DualDriveCommand {
         acknowledge: 0,
     };
 
-    /// The torques of speed demands that nobody limits, in N·m.
+    /// The torques, in N·m, of speed demands that nobody limits.
     pub const UNLIMITED_NM: [f32; 2] = [f32::INFINITY; 2];
 
-    /// The same with the board's link voltage, in V, where the operator leaves it to the board.
+    /// The same command with the board's link voltage, in V, if the operator leaves it to the board.
     #[inline]
     pub fn with_link(mut self, link_ref_v: f32) -> Self {
         let is_named = self.link_ref_v > 0.0;
@@ -108,8 +109,7 @@ pub struct PowerSample {
     pub gates: GateFeedback,
 }
 
-/// Two latches a gate: whether it has been on, and whether it has been off. A bit each, in the order of
-/// [`crate::nine_switch::GATES`].
+/// Two latches a gate: one is set once it has been on, the other once it has been off. A bit each, in the order of [`crate::nine_switch::GATES`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GateFeedback {

@@ -1,4 +1,4 @@
-//! The ports: what each task needs of a board, and the samples and pulses that pass through them.
+//! The ports: the functions that each task needs from a board, and the samples and pulses that pass through them.
 
 #![forbid(unsafe_code)]
 
@@ -16,7 +16,7 @@ pub use dual::{
 };
 pub use report::{DualReport, Report};
 
-/// A control sample: what the converters and the position sensor hold, and what keeps the gates off in hardware.
+/// A control sample: the values of the converters and of the position sensor, and any cause that holds the gates off in hardware.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sample {
@@ -24,7 +24,7 @@ pub struct Sample {
     pub currents_a: Abc,
     /// DC-link voltage at that instant, in V.
     pub udc_v: f32,
-    /// Rotor angle at that instant, electrical, of a sensor that counts the middle of its count; `None` while it is not known, or no longer.
+    /// Rotor angle at that instant, electrical, of a sensor that counts the middle of its count; `None` while it is not known, or no longer known.
     pub angle: Option<Angle>,
     /// `true` while the board lets the gates pulse: its enable input is high, and no break holds them.
     pub may_pulse: bool,
@@ -33,7 +33,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// The control law's measurements. An angle that is not known counts as 0; no pulses are made of it.
+    /// The control law's measurements. An unknown angle counts as 0; no pulses are made from it.
     #[inline]
     pub fn measured(&self) -> Measurements {
         let Self { currents_a, udc_v, angle, .. } = *self;
@@ -49,16 +49,16 @@ pub struct DriveCommand {
     pub enable: bool,
     /// The torque demand.
     pub demand: Demand,
-    /// DC-link voltages at which torque ends.
+    /// DC-link voltages at which torque is reduced to zero.
     pub window: LinkWindow,
     /// Number of the operator's last acknowledge: a new one, with the gates off, makes both interrupts forget their fault.
     pub acknowledge: u8,
-    /// The warmth of the machine, where its temperatures are measured.
+    /// The warmth of the machine, if its temperatures are measured.
     pub warmth: Warmth,
 }
 
 impl DriveCommand {
-    /// Nothing.
+    /// No command.
     pub const NONE: Self = Self {
         enable: false,
         demand: Demand { torque_nm: 0.0, slew_limited: true },
@@ -74,7 +74,7 @@ impl Default for DriveCommand {
     }
 }
 
-/// One of the two drives: what passes through its ports.
+/// One of the two drives: the types that pass through its ports.
 pub trait System {
     /// The sample of the control interrupt.
     type Sample;
@@ -115,57 +115,57 @@ impl System for Dual {
 
 /// The port of the control interrupt to a board.
 pub trait ControlPort<S: System = Traction> {
-    /// First call of the interrupt, behind a half that is made anew: takes the timer's flag back. Where control `revises` the pulses, the PWM interrupt has come in between
-    /// when this returns.
+    /// First call of the interrupt, after a half was revised: takes the timer's flag back. If control `revises` the pulses, the PWM interrupt has
+    /// come in between when this returns.
     fn begin(&mut self, _revises: bool) {}
     /// The conversions that the control timer triggered at `now`.
     fn sample(&mut self, now: Instant) -> S::Sample;
-    /// The command of this period, after [`Self::sample`]: the `operator`'s. A board that has it from elsewhere, as a simulated one may,
-    /// gives its own.
+    /// The command of this period, after [`Self::sample`]: the `operator`'s. A board that gets it from elsewhere, as a simulated one may, returns its
+    /// own.
     #[inline]
     fn command(&mut self, _now: Instant, operator: impl FnOnce() -> S::Command) -> S::Command {
         operator()
     }
-    /// Puts the gates into the safe state at once, until an acknowledge, whatever is played. Gates off may become a short circuit later; a
-    /// short circuit stays one, whatever either interrupt orders then.
+    /// Puts the gates into the safe state at once, until an acknowledge, whatever is being played. Gates off may become a short circuit later; a
+    /// short circuit remains one, whatever either interrupt then orders.
     fn enter(&mut self, safe: SafeState, now: Instant);
-    /// By how many ticks the interrupt, begun nominally at `now`, has outlived `deadline_ticks`; 0 when in time.
+    /// The number of ticks by which the interrupt, begun nominally at `now`, has exceeded `deadline_ticks`; 0 when in time.
     fn overrun_ticks(&mut self, now: Instant, deadline_ticks: u32) -> u32;
-    /// The control task's report, for whoever watches: made where it is called for.
+    /// The control task's report, for any observer; it is made only when called for.
     fn report(&mut self, now: Instant, report: impl FnOnce() -> S::Report);
-    /// The faults that the power stage reports of its legs; none where it cannot.
+    /// The faults that the power stage reports for its legs; none if it cannot report.
     fn leg_faults(&mut self) -> LegFaults {
         LegFaults::default()
     }
-    /// Turn of the rotor, electrical, since a position sensor that only counts began to, at the newest sample; asked for while that has no
-    /// angle. `None` where there is nothing to count.
+    /// Electrical turn of the rotor at the newest sample, since a position sensor that only counts began to count; asked for while that sensor has no
+    /// angle. `None` if there is nothing to count.
     fn turned(&mut self) -> Option<Angle> {
         None
     }
-    /// The electrical angle that the rotor had where the counting began: from the next sample on the sensor has an angle, until
-    /// an index knows better. Of a machine without magnets it may be half a turn off, which an index has to leave: [`axis_error`](crate::start_up::axis_error).
+    /// The electrical angle that the rotor had where the counting began: from the next sample on the sensor has an angle, until an index gives a
+    /// better one. For a machine without magnets it may be half a turn off, which an index must leave: [`axis_error`](crate::start_up::axis_error).
     fn align(&mut self, _now: Instant, _zero: Angle) {}
 }
 
 /// The port of the PWM interrupt to a board.
 pub trait PwmPort<S: System = Traction> {
-    /// First thing in the interrupt: takes the timer's flag back. `false` when it is no boundary that the interrupt comes for: the PWM
-    /// timer has not asked for it, but control, to revise the pulses; or there is nothing to be done.
+    /// First call in the interrupt: takes the timer's flag back. `false` when the interrupt does not come for a boundary: it was requested not by the
+    /// PWM timer but by control, to revise the pulses; or there is nothing to be done.
     fn begin(&mut self) -> bool {
         true
     }
-    /// The conversions at the carrier boundary `now`; of the ZS9 at the carrier's peak.
+    /// The conversions at the carrier boundary `now`; for the ZS9 at the carrier's peak.
     fn sample(&mut self, now: Instant) -> S::PwmSample;
-    /// Loads the shadow registers: `next` takes over when the half that begins `now` ends; of the ZS9 at the next valley.
+    /// Loads the shadow registers: `next` takes over when the half that begins `now` ends; for the ZS9 at the next valley.
     fn play(&mut self, now: Instant, next: &S::Pulses);
     /// As [`ControlPort::enter`].
     fn enter(&mut self, safe: SafeState, now: Instant);
-    /// `true` if what was played last came after the half that it was for had ended; the gates are off then.
+    /// `true` if the last pulses came after the half that they were for had ended; the gates are off then.
     fn is_late(&mut self) -> bool {
         false
     }
-    /// Leaves the safe state: gates off, until pulses are played again. `false` when something holds the gates: a cause in
-    /// hardware, or a board that only a reset lets go on.
+    /// Leaves the safe state: gates off, until pulses are played again. `false` when something holds the gates: a cause in hardware, or a board that
+    /// requires a reset to continue.
     fn leave(&mut self, _now: Instant) -> bool {
         false
     }

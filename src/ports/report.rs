@@ -11,7 +11,7 @@ use crate::protection::{Trip, trip_from_words, trip_to_words};
 pub struct Report {
     /// Torque demand after envelope, slew and voltage limit, in N·m.
     pub torque_nm: f32,
-    /// Torque of the machine by currents and map, smoothed, in N·m; not a number where the law does not say.
+    /// Torque of the machine from currents and map, smoothed, in N·m; not a number if the law does not estimate it.
     pub flowing_nm: f32,
     /// Current reference, d axis, in A.
     pub id_a: f32,
@@ -21,7 +21,7 @@ pub struct Report {
     pub voltage_v: f32,
     /// Electrical angular speed, in rad/s, negative backward.
     pub omega: f32,
-    /// By how much the machine's flux linkage seems to exceed the map's, as a share; 0 where it turns too slowly to tell.
+    /// Share by which the machine's flux linkage seems to exceed the map's; 0 if it turns too slowly to tell.
     pub map_error: f32,
     /// The latched fault, if any.
     pub trip: Option<Trip>,
@@ -33,12 +33,12 @@ pub struct Report {
     pub speed_known: bool,
     /// Number of the acknowledge that both interrupts have carried out.
     pub acknowledged: u8,
-    /// Pulse pattern that the voltage was made for.
+    /// Pulse pattern for which the voltage was made.
     pub mode: Mode,
 }
 
 impl Report {
-    /// The report of a drive that has not started: the fault that says why, and no measurement.
+    /// The report of a drive that has not started: the fault that gives the reason, and no measurement.
     pub fn refused(trip: Trip) -> Self {
         Self { udc_v: f32::NAN, trip: Some(trip), ..Self::default() }
     }
@@ -96,11 +96,11 @@ pub struct DualReport {
     pub torque_nm: [f32; 2],
     /// Commanded peak phase voltages, in V.
     pub voltage_v: [f32; 2],
-    /// The motors that are on their voltage limit.
+    /// Flags of the motors that are at their voltage limit.
     pub weakening: [bool; 2],
     /// Shoot-through duty.
     pub duty: f32,
-    /// Inductor current that is led to, in A.
+    /// Reference of the inductor current, in A.
     pub inductor_ref_a: f32,
     /// The place of the zero vectors.
     pub scheme: Scheme,
@@ -121,7 +121,7 @@ pub struct DualReport {
 }
 
 impl DualReport {
-    /// The report of a drive that has not started: the fault that says why, and no measurement.
+    /// The report of a drive that has not started: the fault that gives the reason, and no measurement.
     pub fn refused(trip: Trip) -> Self {
         Self { capacitor_v: f32::NAN, source_v: f32::NAN, trip: Some(trip), ..Self::default() }
     }

@@ -1,21 +1,21 @@
-//! The checks of what is measured and of what is asked for.
+//! The checks of measurements and of demands.
 
 use super::{FailedCheck, Fault};
 use crate::control::{Demand, Measurements};
 use crate::frames::Abc;
 use crate::machine::Ratings;
 
-/// The largest error of an angle against the speed's prediction, in electrical rad. The tracker's lag behind a rotor that
-/// accelerates by itself is a quarter of it, of the lightest rotors up to four fifths.
+/// The largest error of an angle against the speed's prediction, in electrical rad. The tracker's lag behind a rotor that accelerates by itself is a
+/// quarter of it, or up to four fifths with the lightest rotors.
 pub const INNOVATION_RAD: f32 = 0.05;
 
-/// The angle, `innovation_rad` off what was expected.
+/// The check of the angle, which is `innovation_rad` away from the expected one.
 pub fn check_angle(innovation_rad: f32) -> Option<FailedCheck> {
     let off_rad = innovation_rad.abs();
     (off_rad > INNOVATION_RAD).then_some((Fault::AngleLost, off_rad, INNOVATION_RAD))
 }
 
-/// An angle that is not known, where it is `needed`.
+/// The check for an unknown angle that is `needed`.
 pub fn check_known(needed: bool) -> Option<FailedCheck> {
     needed.then_some((Fault::PositionSensor, 0.0, 1.0))
 }
@@ -28,17 +28,17 @@ const PHASE_SUM_SHARE: f32 = 0.1;
 pub fn are_sound(currents_a: &Abc, ratings: &Ratings) -> bool {
     let Abc { a, b, c } = *currents_a;
     let flows = |current_a: f32| current_a.abs() <= ratings.trip_current_a;
-    // What is not a number compares as nothing.
+    // Every comparison with NaN is false.
     (a + b + c).abs() <= PHASE_SUM_SHARE * ratings.max_current_a && flows(a) && flows(b) && flows(c)
 }
 
-/// Phase currents alone, as both interrupts sample them.
+/// The check of phase currents alone, as both interrupts sample them.
 #[inline]
 pub fn check_currents(currents_a: &Abc, ratings: &Ratings) -> Option<FailedCheck> {
     if are_sound(currents_a, ratings) { None } else { find_in_currents(currents_a, ratings) }
 }
 
-/// The same for currents that are not sound.
+/// The same check for currents that are not sound.
 #[inline]
 fn find_in_currents(currents_a: &Abc, ratings: &Ratings) -> Option<FailedCheck> {
     let sum = currents_a.a + currents_a.b + currents_a.c;
@@ -56,7 +56,7 @@ fn find_in_currents(currents_a: &Abc, ratings: &Ratings) -> Option<FailedCheck> 
     None
 }
 
-/// Everything the control interrupt measures; `omega` electrical, in rad/s.
+/// The check of everything that the control interrupt measures; `omega` electrical, in rad/s.
 pub fn check_measurements(measured: &Measurements, omega: f32, ratings: &Ratings) -> Option<FailedCheck> {
     let udc = measured.udc_v;
     if !udc.is_finite() {
@@ -68,8 +68,8 @@ pub fn check_measurements(measured: &Measurements, omega: f32, ratings: &Ratings
     check_speed(omega, ratings).or_else(|| check_currents(&measured.currents_a, ratings))
 }
 
-/// `true` if neither [`check_measurements`] nor [`check_undervoltage`] nor [`check_demand`] finds anything: one test for the ordinary period.
-/// `false` where one of them may.
+/// `true` if neither [`check_measurements`] nor [`check_undervoltage`] nor [`check_demand`] finds anything: one test for the ordinary period. `false`
+/// if one of them may find something.
 #[inline(always)]
 pub fn is_sound(measured: &Measurements, omega: f32, demand: &Demand, ratings: &Ratings) -> bool {
     let udc_v = measured.udc_v;
@@ -80,18 +80,18 @@ pub fn is_sound(measured: &Measurements, omega: f32, demand: &Demand, ratings: &
         && demand.torque_nm.is_finite()
 }
 
-/// The link while the gates may be on: without them it may be empty.
+/// The check of the link while the gates may be on: with the gates off it may be empty.
 pub fn check_undervoltage(udc_v: f32, ratings: &Ratings) -> Option<FailedCheck> {
     (udc_v < ratings.trip_dc_under_v).then_some((Fault::DcUndervoltage, udc_v, ratings.trip_dc_under_v))
 }
 
-/// The operator's demand: any finite number is a demand, which the envelope limits.
+/// The check of the operator's demand: any finite number is a demand, which the envelope limits.
 pub fn check_demand(demand: &Demand) -> Option<FailedCheck> {
     let torque = demand.torque_nm;
     if torque.is_finite() { None } else { Some((Fault::NotFinite, torque, f32::MAX)) }
 }
 
-/// Mechanical overspeed, for an electrical speed in rad/s.
+/// The check for mechanical overspeed, from an electrical speed in rad/s.
 pub fn check_speed(omega: f32, ratings: &Ratings) -> Option<FailedCheck> {
     if omega.abs() > ratings.trip_speed_rad_s * ratings.pole_pairs {
         return Some((Fault::Overspeed, omega.abs() / ratings.pole_pairs, ratings.trip_speed_rad_s));
@@ -107,7 +107,7 @@ mod tests {
     use crate::built_in;
     use crate::frames::Angle;
 
-    /// Of every combination of values inside, at and beyond the limits, and of none that is a number, the one test says as the checks do.
+    /// For every combination of values inside, at and beyond the limits, and of NaN, the one test agrees with the checks.
     #[test]
     fn what_is_sound_is_what_no_check_finds() {
         let ratings = &built_in::traction::BUILT_IN.ratings;
@@ -128,7 +128,7 @@ mod tests {
                 let found = check_measurements(&measured, omega, ratings)
                     .or_else(|| check_undervoltage(udc_v, ratings))
                     .or_else(|| check_demand(&demand));
-                // A speed that is no number is found elsewhere, by what is made of it.
+                // A NaN speed is found elsewhere, by its consequences.
                 let expected = found.is_none() && !omega.is_nan();
                 let sound = is_sound(&measured, omega, &demand, ratings);
                 assert_eq!(sound, expected, "{measured:?} {omega} {torque_nm}: {found:?}");

@@ -1,8 +1,8 @@
 //! The watch for measurements that no longer move.
 //!
-//! A healthy current may repeat to the last bit for as long as nothing moves it by a converter's step: near standstill a
-//! coarse converter shows the same value for seconds. So currents that repeat are suspicious only once they should have
-//! changed: because the rotor has turned them, or because the commanded voltage is no longer the one that went with them.
+//! A healthy current may repeat to the last bit as long as nothing changes it by a converter's step: near standstill a coarse converter shows the
+//! same value for seconds. So repeated currents are suspicious only once they should have changed, because the rotor has turned them, or because the
+//! commanded voltage is no longer the one that belonged to them.
 
 use super::{FailedCheck, Fault};
 use crate::control::Measurements;
@@ -13,28 +13,27 @@ use crate::machine::Ratings;
 const FROZEN_PERIODS: u32 = 20;
 /// Share of the largest current above which a current that never changes is suspicious.
 const FROZEN_CURRENT_SHARE: f32 = 0.05;
-/// By how much the rotor must have turned a repeated current, as a share of the largest current: more than a step of a
-/// converter of 8 bits.
+/// Change of a repeated current that the rotor's turn must have caused, as a share of the largest current: more than a step of a converter of 8 bits.
 const TURNED_SHARE: f32 = 0.02;
-/// By how much the voltage must have moved the flux linkage that goes with a repeated current, as a share of the machine's own at its
-/// largest torque: a quarter, above what the dead time's error near a current of zero feigns in the runs of the tests.
+/// Change of the flux linkage that the voltage must have caused with a repeated current, as a share of the machine's own at its largest torque: a
+/// quarter, which is above what the dead time's error near a current of zero feigns in the runs of the tests.
 const PUSHED_SHARE: f32 = 0.25;
-/// The turn of the rotor, by its last known speed, before an unmoving angle is suspicious, in electrical rad.
+/// The turn of the rotor, by its last known speed, from which an unmoving angle is suspicious, in electrical rad.
 const FROZEN_TURN_RAD: f32 = 0.2;
-/// The time for which that speed is believed, in s: a sensor that stands still is found above 10 rad/s, and a rotor that stops within a count
-/// of its encoder is not taken for one. As long a voltage counts.
+/// The time for which that speed is believed, in s: a sensor that stands still is found above 10 rad/s, and a rotor that stops within a count of its
+/// encoder is not mistaken for one. A voltage counts for the same time.
 const BELIEVED_S: f32 = 0.02;
 
-/// Looks for measurements that no longer move.
+/// The watch for measurements that no longer move.
 #[derive(Clone, Copy, Debug)]
 pub struct FrozenWatch {
     /// Currents and angle of the last period.
     last: Option<(Abc, Angle)>,
-    /// Voltage commanded last, stationary frame, in V.
+    /// Last commanded voltage, stationary frame, in V.
     commanded_v: AlphaBeta,
     currents: Repeated,
     angle_for: u32,
-    /// Electrical speed while the angle last moved, fading, in rad/s: the tracker soon believes a sensor that stands still.
+    /// Electrical speed when the angle last moved, fading, in rad/s: the tracker soon believes a sensor that stands still.
     moving: f32,
     turned_rad: f32,
 }
@@ -43,11 +42,11 @@ pub struct FrozenWatch {
 #[derive(Clone, Copy, Debug)]
 struct Repeated {
     periods: u32,
-    /// Voltage commanded when they last changed, in V; this and what follows count from the first period of repeated currents on.
+    /// Voltage commanded when they last changed, in V; this field and those below count from the first period of repeated currents on.
     from_v: AlphaBeta,
-    /// By how much the rotor has turned since, in electrical rad.
+    /// Turn of the rotor since then, in electrical rad.
     turned_rad: f32,
-    /// The flux linkage that the change of the voltage since has added, fading, in V·s.
+    /// The flux linkage that the change of the voltage since then has added, fading, in V·s.
     pushed_wb: AlphaBeta,
 }
 
@@ -72,7 +71,7 @@ impl Repeated {
     #[inline(never)]
     fn is_suspicious(&self, peak_a: f32, ratings: &Ratings) -> bool {
         let largest_a = ratings.max_current_a;
-        // Flux linkage and current of the largest torque, at right angles.
+        // Flux linkage and current at the largest torque, at right angles.
         let flux_wb = ratings.max_torque_nm / (1.5 * ratings.pole_pairs * largest_a);
         let limit_wb = PUSHED_SHARE * flux_wb;
         self.turned_rad.abs() * peak_a > TURNED_SHARE * largest_a
@@ -81,7 +80,7 @@ impl Repeated {
 }
 
 impl FrozenWatch {
-    /// Nothing seen yet.
+    /// A watch that has seen nothing yet.
     pub const fn new() -> Self {
         const NONE: AlphaBeta = AlphaBeta { alpha: 0.0, beta: 0.0 };
         Self {
@@ -94,7 +93,7 @@ impl FrozenWatch {
         }
     }
 
-    /// The turn that the rotor should have made while its angle stood still, and the part of it that is a fault, in electrical rad.
+    /// The turn that the rotor should have made while its angle stood still, and the turn that is a fault, in electrical rad.
     pub fn turned_rad(&self) -> (f32, f32) {
         (self.turned_rad, FROZEN_TURN_RAD)
     }
@@ -104,12 +103,12 @@ impl FrozenWatch {
         self.angle_for > 0
     }
 
-    /// Voltage that control has commanded, stationary frame, in V.
+    /// Takes the voltage that control has commanded, stationary frame, in V.
     pub fn command(&mut self, voltage_v: AlphaBeta) {
         self.commanded_v = voltage_v;
     }
 
-    /// One control period; `omega` is the electrical speed, in rad/s. Call it while pulses are made.
+    /// One control period; `omega` is the electrical speed, in rad/s. To be called while pulses are made.
     #[inline(always)]
     pub fn check(
         &mut self,
@@ -150,7 +149,7 @@ mod tests {
     use crate::built_in::traction::BUILT_IN;
     use crate::frames::{Abc, Angle};
 
-    /// A turn, a push and a rotor that are no more than what may be are not frozen.
+    /// A turn, a push and a rotor within the permitted limits are not frozen.
     #[test]
     fn at_its_borders_nothing_is_frozen() {
         let (ratings, none) = (&BUILT_IN.ratings, AlphaBeta { alpha: 0.0, beta: 0.0 });
@@ -169,7 +168,7 @@ mod tests {
         }
     }
 
-    /// A volt more adds up and fades: to 63 % of what it comes to in the time for which it counts.
+    /// An additional volt adds up and fades: it reaches 63 % of its final value in the time for which it counts.
     #[test]
     fn a_push_counts_for_as_long_as_it_is_believed() {
         let [none, more] = [0.0, 1.0].map(|alpha| AlphaBeta { alpha, beta: 0.0 });

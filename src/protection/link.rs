@@ -8,14 +8,14 @@ use super::{FailedCheck, Fault};
 pub struct LinkLimits {
     /// Source voltage below which the drive trips, in V.
     pub source_min_v: f32,
-    /// Capacitor voltage above which it trips, in V.
+    /// Capacitor voltage above which the drive trips, in V.
     pub capacitor_max_v: f32,
     /// Largest shoot-through duty, 0 ..= 0.5.
     pub duty_max: f32,
 }
 
 impl LinkLimits {
-    /// The duty that a link voltage needs, `(1 − U_dc/U_in)/2`, if it is outside the range.
+    /// The failed check of the duty that a link voltage needs, `(1 − U_dc/U_in)/2`, if it is outside the range.
     pub fn check_link_reference(&self, link_v: f32, source_v: f32) -> Option<FailedCheck> {
         if !link_v.is_finite() {
             return Some((Fault::NotFinite, link_v, f32::MAX));
@@ -24,14 +24,14 @@ impl LinkLimits {
         self.check_duty(duty)
     }
 
-    /// A duty that is commanded.
+    /// The check of a commanded duty.
     pub fn check_duty(&self, duty: f32) -> Option<FailedCheck> {
-        // Not a number is outside as well.
+        // NaN is outside as well.
         let inside = (0.0..=self.duty_max).contains(&duty);
         (!inside).then_some((Fault::DutyRange, duty, self.duty_max))
     }
 
-    /// Source and capacitors.
+    /// The check of source and capacitors.
     pub fn check_link(&self, source_v: f32, capacitor_v: f32) -> Option<FailedCheck> {
         if !(source_v + capacitor_v).is_finite() {
             return Some((Fault::NotFinite, source_v + capacitor_v, f32::MAX));

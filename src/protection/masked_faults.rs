@@ -2,7 +2,7 @@
 
 use super::Fault;
 
-/// Checks that are switched off, to see what is lost without them: on the host, never in a firmware.
+/// Checks that are switched off, to see what is lost without them; on the host only, never in a firmware.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MaskedFaults {
     /// A bit for each fault's discriminant.
@@ -17,7 +17,7 @@ impl MaskedFaults {
         faults: 0,
     };
 
-    /// All but the check that finds this fault.
+    /// All checks on except the one that finds this fault.
     #[cfg(not(target_os = "none"))]
     pub const fn of(fault: Fault) -> Self {
         Self { faults: 1 << fault as u32 }

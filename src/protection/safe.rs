@@ -1,4 +1,4 @@
-//! The safe states, and which of them the speed asks for.
+//! The safe states, and the choice between them by speed.
 
 use super::{FailedCheck, Fault, LegFaults};
 use crate::frames::{Abc, SQRT_3};
@@ -14,7 +14,7 @@ pub enum SafeState {
     /// The three lower devices on: the machine's short-circuit current stays inside its limit, and its EMF does not
     /// reach the link through the diodes.
     ShortCircuit,
-    /// The three upper devices on: the same where a leg is stuck at the upper rail.
+    /// The three upper devices on: the same for a leg that is stuck at the upper rail.
     UpperShortCircuit,
 }
 
@@ -29,12 +29,12 @@ impl SafeState {
     }
 }
 
-/// Margin below the speed where the diodes begin to rectify.
+/// Margin below the speed at which the diodes begin to rectify.
 const RECTIFYING_MARGIN: f32 = 0.9;
 
-/// The safe state for an electrical angular speed in rad/s: gates off below `0.9 udc/(√3 ψ_f)`, short circuit above. What is not
-/// finite counts as slow, because a short circuit at speed zero would be safe as well, but open gates need no gate supply.
-/// A link above its nominal voltage counts as nominal: it will not stay there.
+/// The safe state for an electrical angular speed in rad/s: gates off below `0.9 udc/(√3 ψ_f)`, short circuit above. A value that is not finite
+/// counts as slow: a short circuit at speed zero would be safe as well, but open gates need no gate supply. A link above its nominal voltage counts
+/// as nominal, since it will not stay there.
 #[inline(never)]
 pub fn safe_state(omega: f32, udc_v: f32, ratings: &Ratings) -> SafeState {
     if emf_v(omega, ratings) > RECTIFYING_MARGIN * standing_v(udc_v, ratings) {
@@ -46,34 +46,34 @@ pub fn safe_state(omega: f32, udc_v: f32, ratings: &Ratings) -> SafeState {
 
 /// Share of the link above which the EMF can keep a current alive through the diodes.
 const GENERATING_SHARE: f32 = 0.5;
-/// Phase current that counts as one, as a share of the largest.
+/// Phase current above which current counts as flowing, as a share of the largest.
 const FLOWING_SHARE: f32 = 0.05;
 
-/// Looks for a machine that goes on generating through the diodes, once the gates are off.
+/// The watch for a machine that keeps generating through the diodes once the gates are off.
 ///
-/// A machine whose d axis has another inductance than its q axis holds a current through the diodes at an EMF that could not begin one: a
-/// load of power factor 1, as the diodes are, raises its voltage to `k = ξ/(2√(ξ − 1))` times the EMF, `ξ` the larger inductance over the
-/// smaller, and they conduct with a fundamental of `2 udc/π`. So from `2√3/(πk)` of `udc/(√3 ψ_f)` on what flows when the gates go off may
-/// stay: Jahns and Caliskan, "Uncontrolled generator operation of interior PM synchronous machines following high-speed inverter shutdown",
-/// IEEE Trans. Ind. Appl. 35(6), 1999. Up to `ξ` = 18 that is above half the link, with saturation and hot or cold magnets.
+/// A machine whose d and q axes differ in inductance can sustain a current through the diodes at an EMF that could not start one: a load of power
+/// factor 1, such as the diodes, raises its voltage to `k = ξ/(2√(ξ − 1))` times the EMF, where `ξ` is the larger inductance divided by the smaller,
+/// and the diodes conduct with a fundamental of `2 udc/π`. So from `2√3/(πk)` of `udc/(√3 ψ_f)` on, a current that flows when the gates go off may
+/// persist: Jahns and Caliskan, "Uncontrolled generator operation of interior PM synchronous machines following high-speed inverter shutdown", IEEE
+/// Trans. Ind. Appl. 35(6), 1999. Up to `ξ` = 18 that is above half the link, with saturation and hot or cold magnets.
 ///
-/// Where nothing is held, the current is gone within an electrical turn. What flows into a machine by one phase leaves it by another: a current that
-/// one phase alone shows is its sensor's, and a short circuit for it would brake. Of two sensors that are left the zero crossings show none; a turn
-/// less each is taken back by as much as they last. An empty link counts as one at the trip level of its voltage.
+/// If no current is sustained, it is gone within an electrical turn. A current that enters a machine by one phase leaves it by another: a current
+/// that only one phase shows comes from its sensor, and a short circuit because of it would brake. If two sensors are left, they show none at the
+/// zero crossings; their duration is subtracted again from the turn counted. An empty link counts as one at the trip level of its voltage.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DiodeWatch {
-    /// By how much further the rotor has turned while current flowed than while none did, in electrical rad.
+    /// Turn of the rotor while current flowed less its turn while none did, in electrical rad.
     turned_rad: f32,
 }
 
 impl DiodeWatch {
-    /// Of gates that have just gone off.
+    /// The watch of gates that have just gone off.
     pub const fn new() -> Self {
         Self { turned_rad: 0.0 }
     }
 
-    /// A period after a trip into the state `safe`; the short circuit once gates that are off should become it, because a current that the EMF
-    /// may hold has flowed for an electrical turn. What is not a number is no current.
+    /// A period after a trip into the state `safe`. Returns the short circuit once gates that are off should become it, because a current that the
+    /// EMF may sustain has flowed for an electrical turn. NaN is no current.
     pub fn step(
         &mut self,
         safe: SafeState,
@@ -105,7 +105,7 @@ pub struct OpenGates {
     pub udc_v: f32,
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
-    /// Its length, in s.
+    /// Length of the period, in s.
     pub period_s: f32,
 }
 
@@ -114,7 +114,7 @@ pub fn generating(open: &OpenGates, ratings: &Ratings) -> FailedCheck {
     (Fault::CurrentOffset, open.currents_a.peak(), FLOWING_SHARE * ratings.max_current_a)
 }
 
-/// The link's voltage, in V; above its nominal voltage that: it will not stay there.
+/// The link's voltage, in V, at most its nominal voltage: a higher one will not last.
 fn standing_v(udc_v: f32, ratings: &Ratings) -> f32 {
     let nominal_v = ratings.dc_link_nominal_v;
     if udc_v < nominal_v { udc_v } else { nominal_v }
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use crate::built_in::traction::BUILT_IN;
 
-    /// After a turn of current it is not yet the short circuit, after more than one it is.
+    /// After a turn of current the state is not yet the short circuit; after more than one it is.
     #[test]
     fn gates_that_are_off_wait_for_a_whole_turn() {
         let ratings = &BUILT_IN.ratings;

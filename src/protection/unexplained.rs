@@ -1,39 +1,39 @@
 //! The watch for a voltage that nothing explains.
 //!
-//! At each boundary the control law compares the flux linkage that currents and angle show with the volt-seconds that acted. What it leaves
-//! unexplained on average is small while the angle is the rotor's: a warm winding, the devices, a map that is off. An angle that stands still
-//! or counts the wrong way while the rotor turns leaves the whole EMF.
+//! At each boundary the control law compares the flux linkage that currents and angle show with the volt-seconds that acted. The average that remains
+//! unexplained is small while the angle is the rotor's: it comes from a warm winding, the devices, an inaccurate map. An angle that stands still or
+//! counts the wrong way while the rotor turns leaves the whole EMF unexplained.
 
 use super::{FailedCheck, Fault};
 use crate::frames::Dq;
 use crate::machine::Tables;
 
-/// Shares of the drop of the largest current in the resistance, of the nominal link, and of the EMF of the flux linkage at full torque, which together
-/// may stay unexplained for ever: a winding that is hot, with devices and their dead time; and a map or an angle that is off.
+/// Shares of the drop of the largest current in the resistance, of the nominal link, and of the EMF of the flux linkage at full torque, which
+/// together may remain unexplained for ever: a hot winding, with devices and their dead time; and an inaccurate map or angle.
 const DROP_SHARE: f32 = 0.8;
 const LINK_SHARE: f32 = 0.01;
 const EMF_SHARE: f32 = 0.25;
-/// Share of that flux linkage that the voltage beyond these may add up to: a reversal of the torque by a map that is a fifth off adds up to two
-/// fifths at most, less what these take.
+/// Share of that flux linkage that the voltage beyond these may add up to: a reversal of the torque with a map that is a fifth off adds up to two
+/// fifths at most, less the parts above.
 const FLUX_SHARE: f32 = 0.2;
-/// The knee of the weakening tables over the flux linkage at full torque.
+/// Ratio of the knee of the weakening tables to the flux linkage at full torque.
 const KNEE_PER_FLUX: f32 = 0.345;
 
-/// Looks for a voltage that nothing explains.
+/// The watch for a voltage that nothing explains.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct UnexplainedWatch {
-    /// Volt-seconds beyond what may stay unexplained, in V·s.
+    /// Volt-seconds beyond those that may remain unexplained, in V·s.
     excess_wb: f32,
 }
 
 impl UnexplainedWatch {
-    /// Nothing seen yet.
+    /// A watch that has seen nothing yet.
     pub const fn new() -> Self {
         Self { excess_wb: 0.0 }
     }
 
-    /// A boundary has passed after a half of so many seconds, with a voltage that is left unexplained, in V, rotor frame, of which a dead time that is told may
-    /// take so many, in V, from 0, at an electrical speed in rad/s.
+    /// A boundary has passed after a half of this many seconds, with an unexplained voltage, in V, rotor frame. A configured dead time may account
+    /// for a part of it, at most the second argument, in V, from 0. The electrical speed is in rad/s.
     #[inline(always)]
     pub fn step(&mut self, unexplained_v: Dq, dead_v: f32, omega: f32, half_s: f32, tables: &Tables) {
         let ratings = &tables.ratings;
@@ -41,11 +41,11 @@ impl UnexplainedWatch {
             + LINK_SHARE * ratings.dc_link_nominal_v;
         let may_be_v = still_v + dead_v + EMF_SHARE * full_flux_wb(tables) * omega.abs();
         let excess_wb = self.excess_wb + (unexplained_v.length() - may_be_v) * half_s;
-        // What is not a number is found elsewhere.
+        // NaN is found elsewhere.
         self.excess_wb = if excess_wb > 0.0 { excess_wb } else { 0.0 };
     }
 
-    /// The fault, once the volt-seconds are too many.
+    /// The fault, once the volt-seconds exceed their limit.
     #[inline(always)]
     pub fn check(&self, tables: &Tables) -> Option<FailedCheck> {
         let limit_wb = FLUX_SHARE * full_flux_wb(tables);
@@ -69,7 +69,8 @@ mod tests {
 
     const HALF_S: f32 = 0.5e-3;
 
-    /// The halves until a voltage of the machine with these tables, of which a dead time may take a part, is a fault, in V at an electrical speed in rad/s; `None` of 2,000.
+    /// The number of halves until a voltage of the machine with these tables, of which a dead time may account for a part, is a fault, in V at an
+    /// electrical speed in rad/s; `None` of 2,000.
     fn found_after(unexplained_v: f32, dead_v: f32, omega: f32, tables: &Tables) -> Option<u32> {
         let mut watch = UnexplainedWatch::new();
         (1..2_000).find(|_| {
@@ -78,7 +79,7 @@ mod tests {
         })
     }
 
-    /// The EMF of a rotor that turns while its angle stands is found within half a turn; a voltage that may stay unexplained never is.
+    /// The EMF of a rotor that turns while its angle stands still is found within half a turn; a voltage that may remain unexplained never is.
     #[test]
     fn an_emf_is_found_and_what_may_be_is_not() {
         for tables in [&BUILT_IN, &zs9::BUILT_IN] {
@@ -90,7 +91,7 @@ mod tests {
                 let may_be_v =
                     dead_v + 0.8 * drop_v + 0.01 * dc_link_nominal_v + 0.25 * flux_wb * omega.abs();
                 assert_eq!(found_after(0.999 * may_be_v, dead_v, omega, tables), None, "{omega} rad/s");
-                // A volt more for so long that it is a fifth of the flux linkage.
+                // An additional volt until it is a fifth of the flux linkage.
                 let halves = found_after(may_be_v + 1.0, dead_v, omega, tables).unwrap();
                 assert!((halves as f32 * HALF_S / (0.2 * flux_wb) - 1.0).abs() < 0.01, "{halves} halves");
             }
@@ -100,7 +101,7 @@ mod tests {
         }
     }
 
-    /// Volt-seconds of short voltages are forgotten; of one that stays the excess and the limit are told; no number is none.
+    /// Volt-seconds of short voltages are forgotten; a lasting voltage is reported with the excess and the limit; NaN is no voltage.
     #[test]
     fn volt_seconds_beyond_it_add_up_and_are_forgotten() {
         let (limit_wb, mut watch) = (0.2 * full_flux_wb(&BUILT_IN), UnexplainedWatch::new());
@@ -118,7 +119,7 @@ mod tests {
         assert!((1.0..1.05).contains(&(excess_wb / limit_wb)), "{excess_wb} V·s");
     }
 
-    /// The flux linkage at full torque, as the map has it, within a tenth.
+    /// The flux linkage at full torque agrees with the map's within a tenth.
     #[test]
     fn the_flux_linkage_is_that_of_full_torque() {
         for tables in [&BUILT_IN, &zs9::BUILT_IN] {

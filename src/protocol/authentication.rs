@@ -1,12 +1,12 @@
-//! Authentication of commands: [`COMMAND`] with a tag that only the holder of a key can make, and that holds for one frame alone.
+//! Authentication of commands: [`COMMAND`] with a tag that only the holder of a key can make, and that is valid for one frame alone.
 //!
 //! The tag is the first 24 bits of an AES-128 CMAC (RFC 4493) over 16 bytes, all little-endian: the epoch (8), the frame's number in
-//! it (4), and the frame's bytes 1 to 4, which are counter, levels, torque and mark. It stands in bytes 5 to 7, which COMMAND leaves free; the
-//! CRC covers it as any content. Of the number the frame carries the lowest four bits, its counter; the receiver knows the others.
-//! So this is AUTOSAR's SecOC in outline, without its freshness server: who brings the *epoch* to both ends must never use one twice
-//! with a key, or a recording of the first time is followed in the second.
+//! it (4), and the frame's bytes 1 to 4, which are counter, levels, torque and mark. It stands in bytes 5 to 7, which COMMAND leaves free; the CRC
+//! covers it like any content. The frame carries the lowest four bits of the number as its counter; the receiver knows the others. In outline this is
+//! AUTOSAR's SecOC, without its freshness server: whoever supplies the *epoch* to both ends must never use one twice with a key; otherwise a
+//! recording of the first time would be followed in the second.
 //!
-//! The guard stands in front of the drive's end and knows nothing of it; the other messages pass it as they are:
+//! The guard stands in front of the drive's end and knows nothing of it; the other messages pass unchanged:
 //!
 //! ```
 //! use tractive::protocol::authentication::{Guard, Signer};
@@ -32,14 +32,14 @@ use cmac::{Cmac, KeyInit, Mac};
 
 /// Length of a key, in bytes.
 pub const KEY_LENGTH: usize = 16;
-/// Bits of a frame in front of the tag.
+/// Bits of a frame before the tag.
 const CONTENT_BITS: u32 = 40;
-/// Frames after which the counter is the same again.
+/// Number of frames after which the counter repeats.
 const ROUND: u32 = 16;
-/// Rounds of the counter within which a number is looked for: as many frames less one may be lost in a row, 630 ms of commands.
+/// Rounds of the counter within which a number is searched: as many frames less one may be lost in a row, 630 ms of commands.
 const ROUNDS: u32 = 4;
 
-/// The code over an epoch, a frame's number in it, and the frame's bytes in front of the tag.
+/// The code over an epoch, a frame's number in it, and the frame's bytes before the tag.
 fn code(cipher: &Cmac<Aes128>, epoch: u64, number: u32, data: &[u8; 8]) -> Cmac<Aes128> {
     let [_, head, low, high, tail, ..] = *data;
     cipher
@@ -53,19 +53,19 @@ fn code(cipher: &Cmac<Aes128>, epoch: u64, number: u32, data: &[u8; 8]) -> Cmac<
 pub struct Signer {
     cipher: Cmac<Aes128>,
     epoch: u64,
-    /// The next frame's number; `None` behind the last one.
+    /// The next frame's number; `None` after the last one.
     next: Option<u32>,
     counter: Counter,
 }
 
 impl Signer {
-    /// At the beginning of an epoch.
+    /// The state at the beginning of an epoch.
     pub fn new(key: &[u8; KEY_LENGTH], epoch: u64) -> Self {
         Self { cipher: Cmac::new(&(*key).into()), epoch, next: Some(0), counter: Counter::new() }
     }
 
-    /// The next frame with this content of [`COMMAND`], its mark included; `None` where the content reaches into the tag, and behind the
-    /// epoch's last frame, the 2³²nd.
+    /// The next frame with this content of [`COMMAND`], its mark included; `None` if the content reaches into the tag, and after the epoch's last
+    /// frame, the 2³²nd.
     pub fn frame(&mut self, content: Payload) -> Option<Frame> {
         let number = self.next.filter(|_| content.0 >> CONTENT_BITS == 0)?;
         let head = COMMAND.frame(content, &mut self.counter).data;
@@ -83,19 +83,19 @@ impl Signer {
 pub struct Guard {
     cipher: Cmac<Aes128>,
     epoch: u64,
-    /// The lowest number that has not been used; `None` behind the last one.
+    /// The lowest number that has not been used; `None` after the last one.
     next: Option<u32>,
     refused: u32,
 }
 
 impl Guard {
-    /// At the beginning of an epoch.
+    /// The state at the beginning of an epoch.
     pub fn new(key: &[u8; KEY_LENGTH], epoch: u64) -> Self {
         Self { cipher: Cmac::new(&(*key).into()), epoch, next: Some(0), refused: 0 }
     }
 
-    /// The frame for the drive's end: a command without its tag; anything else, and a command that is damaged, as it is, for the receiver to judge.
-    /// `None` for a command whose tag is not that of a frame still to come.
+    /// The frame for the drive's end: a command without its tag; any other frame, and a damaged command, unchanged, for the receiver to judge. `None`
+    /// for a command whose tag is not that of a frame still to come.
     pub fn admit(&mut self, frame: &Frame) -> Option<Frame> {
         if frame.id != COMMAND.id || frame.length != LENGTH || !COMMAND.is_intact(frame) {
             return Some(*frame);
@@ -112,7 +112,7 @@ impl Guard {
         Some(Frame { data, ..*frame })
     }
 
-    /// The number of a frame with this counter by which its tag is right.
+    /// The number with which a frame with this counter has a correct tag.
     fn number(&self, counter: u8, data: &[u8; 8]) -> Option<u32> {
         let next = self.next?;
         let nearest = next.checked_add(u32::from(counter).wrapping_sub(next) % ROUND)?;

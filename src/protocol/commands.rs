@@ -35,7 +35,7 @@ pub(super) const WRITE: Signal = Signal::flag("write", 12);
 pub(super) const PARAMETER: Signal = Signal::number("parameter", 16, 8, 0xFF);
 pub(super) const VALUE: Signal = Signal::float("value", 32);
 
-/// Levels and torque. Without it the drive does nothing.
+/// Levels and torque. Without this message the drive does nothing.
 pub const COMMAND: Message = Message::new(
     "COMMAND",
     0x101,
@@ -45,15 +45,15 @@ pub const COMMAND: Message = Message::new(
 )
 .telling(36, &[Quantity::Torque]);
 
-/// Limits of torque and speed; as rated until it comes.
+/// Limits of torque and speed; the rated ones until it comes.
 pub const LIMITS: Message = Message::new("LIMITS", 0x102, 2, 100, &[MOTORING, BRAKING, SPEED])
     .telling(12, &[Quantity::Torque, Quantity::Speed]);
 
-/// Limits of the link; as rated until it comes.
+/// Limits of the link; the rated ones until it comes.
 pub const LINK_LIMITS: Message =
     Message::new("LINK_LIMITS", 0x103, 3, 100, &[LINK_LOW, LINK_HIGH]).telling(12, &[Quantity::Voltage]);
 
-/// Reads a parameter, or writes it.
+/// Reads or writes a parameter.
 pub const PARAMETER_REQUEST: Message =
     Message::new("PARAMETER_REQUEST", 0x104, 4, 0, &[WRITE, PARAMETER, VALUE]);
 
@@ -92,26 +92,26 @@ pub(super) fn levels(payload: Payload) -> Levels {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Command {
-    /// Enable, by its rising edge.
+    /// Enable, by a rising edge.
     pub enable: bool,
     /// The enabling edge may come with a torque.
     pub with_torque: bool,
     /// Gates off at once.
     pub off: bool,
-    /// Torque to zero, then gates off, for as long as it is set.
+    /// Torque to zero, then gates off, for as long as this is set.
     pub coast: bool,
-    /// Charge the link, by its rising edge.
+    /// Charge the link, by a rising edge.
     pub charge: bool,
-    /// Discharge the link, by its rising edge.
+    /// Discharge the link, by a rising edge.
     pub discharge: bool,
-    /// Acknowledge the fault, by its rising edge.
+    /// Acknowledge the fault, by a rising edge.
     pub acknowledge: bool,
     /// Torque, in N·m.
     pub torque_nm: f32,
 }
 
 impl Command {
-    /// Nothing asked.
+    /// The command that asks for nothing.
     pub const AT_REST: Self = Self {
         enable: false,
         with_torque: false,
@@ -149,7 +149,7 @@ pub struct TorqueLimits {
     pub motoring_nm: f32,
     /// Largest braking torque, in N·m.
     pub braking_nm: f32,
-    /// Speed beyond which nothing accelerates, in r/min.
+    /// Speed beyond which the drive does not accelerate, in r/min.
     pub speed_rpm: f32,
 }
 
@@ -165,7 +165,7 @@ impl TorqueLimits {
 
     /// From a frame's content without its mark; `None` if a value is out of its range or an unused bit is set.
     pub fn decode(payload: Payload, scales: Scales) -> Option<Self> {
-        // Of the ZS9's motors the same signals.
+        // The ZS9's motors have the same signals.
         LIMITS.is_tidy(payload).then_some(())?;
         Some(Self {
             motoring_nm: MOTORING.get_on(scales, payload)?,

@@ -25,7 +25,7 @@ const REMAINDERS: [u8; 16] = {
 };
 
 fn half(crc: u8) -> u8 {
-    // Four bits are always within the table; so the compiler needs no check.
+    // Four bits are always within the table, so the compiler needs no check.
     REMAINDERS[usize::from(crc >> 4) & 0xF] ^ crc << 4
 }
 

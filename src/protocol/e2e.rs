@@ -1,18 +1,18 @@
 //! End-to-end protection after AUTOSAR's profile 2: byte 0 is a CRC, the lower half of byte 1 a counter.
 //!
-//! The CRC ([`crc8_h2f`]) runs over bytes 1 to 7 and then over a byte that is not sent: of 16 data identifiers of the message
-//! the one with the counter's number. So a frame that comes under another message's identifier does not check.
+//! The CRC ([`crc8_h2f`]) runs over bytes 1 to 7 and then over a byte that is not sent: the one of the message's 16 data identifiers whose index is
+//! the counter. So a frame that comes under another message's identifier fails the check.
 
 use super::crc::crc8_h2f;
 
 /// The 16 data identifiers of a message.
 pub type DataIds = [u8; 16];
 
-/// Largest step of the counter that is taken: up to two frames may be lost in a row.
+/// Largest step of the counter that is accepted: up to two frames may be lost in a row.
 pub const MAX_DELTA: u8 = 3;
 
-/// The data identifiers of the message with this number, 1 ..= 31: the number's lower half in the upper half, in the lower one the
-/// counter, with its highest bit turned from number 16 on. So at one counter no two messages share one.
+/// The data identifiers of the message with this number, 1 ..= 31: the upper half of each is the number's lower half, the lower half is the counter,
+/// with its highest bit inverted from number 16 on. So no two messages share an identifier at the same counter.
 pub const fn data_ids(number: u8) -> DataIds {
     let turned = if number & 0x10 != 0 { 8 } else { 0 };
     let mut list = [0; 16];
@@ -40,7 +40,7 @@ pub fn protect(data: &mut [u8; 8], counter: u8, ids: &DataIds) {
     data[0] = crc(data, ids);
 }
 
-/// `true` if the CRC is right.
+/// `true` if the CRC is correct.
 pub fn is_intact(data: &[u8; 8], ids: &DataIds) -> bool {
     data[0] == crc(data, ids)
 }
@@ -50,7 +50,7 @@ pub fn is_intact(data: &[u8; 8], ids: &DataIds) -> bool {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Order {
-    /// The first one, or the first after a silence: it sets the counter and has no effect.
+    /// The first frame, or the first after a silence: it sets the counter and has no effect.
     First,
     /// In order, after this many lost ones.
     Next {
@@ -59,7 +59,7 @@ pub enum Order {
     },
     /// The same counter again.
     Repeated,
-    /// Too far from the last one: old, or too many are lost.
+    /// Too far from the last one: old, or too many frames are lost.
     Wrong,
 }
 
@@ -75,12 +75,12 @@ impl Sequence {
         Self { last: None }
     }
 
-    /// After a silence: the next frame only sets the counter.
+    /// Notes a silence: the next frame only sets the counter.
     pub fn forget(&mut self) {
         self.last = None;
     }
 
-    /// A frame with a right CRC. One that is repeated or out of order leaves the sequence as it is, so that it cannot disturb.
+    /// Judges a frame with a correct CRC. A frame that is repeated or out of order leaves the sequence as it is, so that it cannot disturb it.
     pub fn judge(&mut self, counter: u8) -> Order {
         let Some(last) = self.last else {
             self.last = Some(counter);
@@ -102,7 +102,7 @@ impl Sequence {
 pub struct Counter(u8);
 
 impl Counter {
-    /// Begins at 0.
+    /// A counter that begins at 0.
     pub const fn new() -> Self {
         Self(0)
     }

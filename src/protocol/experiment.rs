@@ -1,4 +1,4 @@
-//! The messages that an image with an identification's law sends besides the drive's: its progress, and what it observed.
+//! The messages that an image with an identification's law sends besides the drive's: its progress, and its observations.
 
 use super::message::Message;
 use super::signal::{Payload, Signal};
@@ -12,7 +12,7 @@ const INDEX: Signal = Signal::number("index", 16, 13, 0x1FFF);
 const LOW: Signal = Signal::number("low", 32, 16, 0xFFFF);
 const HIGH: Signal = Signal::number("high", 48, 16, 0xFFFF);
 
-/// The part of the experiment, and the number of its observations so far.
+/// The stage of the experiment, and the number of its observations so far.
 pub const EXPERIMENT: Message = Message::new("EXPERIMENT", 0x18A, 14, 100, &[STAGE, OBSERVATIONS]);
 
 /// One word of a packed observation.
@@ -24,7 +24,7 @@ pub const FROM_IDENTIFICATION: [&Message; 2] = [&EXPERIMENT, &OBSERVATION];
 /// Content of [`EXPERIMENT`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ExperimentFrame {
-    /// The part that is going on; [`Stage::Done`] before the first experiment, too, but then without observations.
+    /// The stage in progress; [`Stage::Done`] before the first experiment, too, but then without observations.
     pub stage: Stage,
     /// Observations so far.
     pub observations: u16,
@@ -39,7 +39,7 @@ impl ExperimentFrame {
         payload
     }
 
-    /// From a frame's content; `None` if the stage is none.
+    /// From a frame's content; `None` if the stage is invalid.
     pub fn decode(payload: Payload) -> Option<Self> {
         let stage = *Stage::ALL.get(STAGE.raw(payload) as usize)?;
         Some(Self { stage, observations: OBSERVATIONS.raw(payload) as u16 })
@@ -68,7 +68,7 @@ impl ObservationFrame {
         payload
     }
 
-    /// From a frame's content; `None` if the number of the word is none.
+    /// From a frame's content; `None` if the number of the word is invalid.
     pub fn decode(payload: Payload) -> Option<Self> {
         PART.get(payload)?;
         Some(Self {

@@ -6,9 +6,9 @@ use embedded_can::{Id, StandardId};
 /// Bytes that a frame carries at most.
 pub const LENGTH: u8 = 8;
 
-/// A data frame. Identifiers of 29 bits and remote frames are none of the protocol's; a controller filters them out.
+/// A data frame. Identifiers of 29 bits and remote frames are not part of the protocol; a controller filters them out.
 ///
-/// By [`embedded_can::Frame`] it becomes the frame of any CAN driver, and any driver's frame becomes one:
+/// Through [`embedded_can::Frame`] it becomes the frame of any CAN driver, and any driver's frame becomes one:
 ///
 /// ```
 /// use embedded_can::{ExtendedId, Frame as _, Id, StandardId};
@@ -69,7 +69,7 @@ impl embedded_can::Frame for Frame {
     }
 }
 
-/// Word 0: this bit says that there is a frame at all.
+/// Bit of word 0 that says that there is a frame at all.
 const PRESENT: u32 = 1 << 31;
 
 impl Words<3> for Option<Frame> {

@@ -19,12 +19,12 @@ pub struct Message {
     pub id: u16,
     /// Number for the protection, 1 ..= 31.
     pub number: u8,
-    /// Time from one to the next, in ms; 0 where it is sent on occasion.
+    /// Time from one to the next, in ms; 0 if it is sent on occasion.
     pub period_ms: u16,
     /// Signals besides CRC and counter.
     pub signals: &'static [Signal],
     data_ids: DataIds,
-    /// The worth of the lowest of the four bits that tell the scales, and the mask of the quantities.
+    /// Value of the lowest of the four bits that give the scales, and the mask of the quantities.
     mark: (u64, u32),
     /// The bits of all signals.
     used: u64,
@@ -48,25 +48,25 @@ impl Message {
         Self { name, id, number, period_ms, signals, data_ids: e2e::data_ids(number), mark: (0, 0), used }
     }
 
-    /// The same, with four bits from `start` on that tell the scales of these quantities.
+    /// The same message, with four bits from `start` on that give the scales of these quantities.
     pub const fn telling(self, start: u32, quantities: &[Quantity]) -> Self {
         Self { mark: (1 << start, Scales::mask(quantities)), ..self }
     }
 
-    /// A content with the bits that tell the scales, or, where it has them, without. On the usual scales they are zero.
+    /// The content with the bits that give the scales added, or removed if it has them. On the usual scales they are zero.
     #[inline(never)]
     pub const fn mark(&self, content: Payload, scales: Scales) -> Payload {
         let (worth, mask) = self.mark;
         Payload(content.0 ^ worth.wrapping_mul(scales.code(mask) as u64))
     }
 
-    /// The quantities whose scales it tells.
+    /// The quantities whose scales the message gives.
     pub fn quantities(&self) -> impl Iterator<Item = Quantity> {
         let (_, mask) = self.mark;
         Quantity::SCALED.into_iter().filter(move |quantity| mask & Scales::mask(&[*quantity]) != 0)
     }
 
-    /// The signal of the bits that tell the scales, with the one value that it may have; `None` on the usual scales.
+    /// The signal of the bits that give the scales, with the one value that it may have; `None` on the usual scales.
     pub fn mark_signal(&self, scales: Scales) -> Option<Signal> {
         let (worth, mask) = self.mark;
         let code = scales.code(mask);
@@ -87,7 +87,7 @@ impl Message {
         Frame { id: self.id, length: LENGTH, data }
     }
 
-    /// `true` if a frame of this message has the right CRC.
+    /// `true` if a frame of this message has the correct CRC.
     #[inline(never)]
     pub fn is_intact(&self, frame: &Frame) -> bool {
         e2e::is_intact(&frame.data, &self.data_ids)

@@ -11,11 +11,11 @@ use crate::machine::Ratings;
 use crate::operator::{Demands, MotorLimits};
 use crate::thermal::Temperatures;
 
-/// A drive's messages, and, as a value, what was said last.
+/// A drive's messages; a value of the type is the content received last.
 pub trait MessageSet: Copy + 'static {
     /// The demands of its operator.
     type Demands: Demands;
-    /// The content of a frame that was taken.
+    /// The content of an accepted frame.
     type Content: Copy;
     /// Measurements of its telemetry.
     type Measured: Copy;
@@ -24,25 +24,25 @@ pub trait MessageSet: Copy + 'static {
 
     /// The messages to it: the command first.
     const TO_DRIVE: &'static [&'static Message];
-    /// The messages from it: status, three of measurements, the fault's value and limit, counters, the answer about a parameter;
-    /// where a drive has them, a fourth of measurements and the temperatures.
+    /// The messages from it: status, three of measurements, the fault's value and limit, counters, the answer about a parameter; and, for a drive
+    /// that has them, a fourth of measurements and the temperatures.
     const FROM_DRIVE: &'static [&'static Message];
     /// The first frame of a message, or the first after a silence: it only sets the counter.
     const GREETING: Self::Content;
     /// `true` for the ZS9, whose ratings are its operator's.
     const IS_ZS9: bool;
-    /// Nothing said.
+    /// The state before anything was received.
     const SILENT: Self;
 
     /// The content of a frame of [`Self::TO_DRIVE`] without its mark; `None` if a value is out of its range or an unused bit is set.
     fn decode(id: u16, payload: Payload, scales: Scales) -> Option<Self::Content>;
-    /// Keeps what is said.
+    /// Keeps a content.
     fn take(&mut self, content: Self::Content) -> Taken;
-    /// The command is forgotten, as if nothing were asked.
+    /// Forgets the command, as if nothing were asked.
     fn rest(&mut self);
-    /// The request to the operator: nothing but off before it is `armed`, no torque unless the command is `fresh`.
+    /// The request to the operator: only off before it is `armed`, no torque unless the command is `fresh`.
     fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> Request<Self>;
-    /// The measurements and the pattern that are sent of a report and the temperatures.
+    /// The measurements and the pattern to be sent for a report and the temperatures.
     fn observed(
         report: Option<&Report<Self>>,
         temperatures: Option<&Temperatures>,
@@ -59,13 +59,13 @@ pub type Report<D> = <<D as MessageSet>::Demands as Demands>::Report;
 /// The operator's status of the demands.
 pub type DemandStatus<D> = <<D as MessageSet>::Demands as Demands>::Status;
 
-/// The consequence of a frame's content.
+/// The further action that a frame's content requires.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Taken {
-    /// Nothing more is to be done.
+    /// No further action.
     Kept,
-    /// A command has come; whether nothing is asked in it.
+    /// A command has come; the field is `true` if it asks for nothing.
     Command {
         /// All levels but off are low.
         at_rest: bool,
@@ -74,15 +74,15 @@ pub enum Taken {
     Parameter(ParameterRequest),
 }
 
-/// Rounding that is forgiven at a rating, as a share of it.
+/// Rounding that is tolerated at a rating, as a share of it.
 const STEP_SHARE: f32 = 1e-4;
 
-/// The value that holds: one sent beyond the rating stays, so that it is refused with a reason; within it the parameter holds.
+/// The value in force: a value sent beyond the rating is kept, so that it is refused with a reason; within the rating the parameter limits it.
 fn beyond(sent: f32, parameter: f32, rated: f32) -> f32 {
     if sent > rated * (1.0 + STEP_SHARE) || sent < parameter { sent } else { parameter }
 }
 
-/// The lower of the sender's limits and the parameters, of one motor.
+/// The lower of the sender's limits and the parameters, for one motor.
 #[inline(never)]
 pub(super) fn motor_limits(
     sent: Option<&TorqueLimits>,
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
     use crate::built_in::traction::BUILT_IN;
 
-    /// Limits with parameters at three quarters of the ratings, of a sender that asks for shares of the ratings.
+    /// Limits with parameters at three quarters of the ratings, for a sender that asks for shares of the ratings.
     fn limits(torque: f32, speed: f32) -> MotorLimits {
         let mut parameters = Parameters::rated(&BUILT_IN.ratings);
         parameters.torque_limit_nm *= 0.75;
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn the_lower_of_sender_and_parameter_holds_and_what_exceeds_a_rating_stays_to_be_refused() {
-        // Sent, and what holds: a rating that rounding raised is none that exceeds it.
+        // The value sent, and the one in force: a rating raised by rounding does not count as exceeded.
         for (sent, holds) in [
             (0.0, 0.0),
             (0.5, 0.5),
@@ -172,7 +172,7 @@ mod tests {
         }
     }
 
-    /// A rating that was rounded is that rating, up to the border and no further.
+    /// A rounded rating counts as the rating, up to the tolerance and no further.
     #[test]
     fn rounding_is_forgiven_up_to_its_border() {
         let border = 1_000.0 * (1.0 + STEP_SHARE);

@@ -1,11 +1,10 @@
 //! Commands and telemetry in CAN frames: the same bytes on a bus and on the link to the rig.
 //!
-//! Every message is a [`Message`] of eight bytes: CRC and counter first ([`e2e`], AUTOSAR's profile 2), then [`Signal`]s as the
-//! DBC file publishes them. The drive's end is a [`Session`]: it judges what comes ([`Receiver`]: a frame takes effect whole
-//! or not at all, and every rejected one is counted by its cause), makes a request of it that ages (torque zero, then off), and
-//! sends telemetry in fixed slots (`Sender`).
+//! Every message is a [`Message`] of eight bytes: CRC and counter first ([`e2e`], AUTOSAR's profile 2), then [`Signal`]s as the DBC file publishes
+//! them. The drive's end is a [`Session`]. It judges incoming frames ([`Receiver`]: a frame takes effect whole or not at all, and every rejected one
+//! is counted by its cause), turns them into a request that ages (torque zero, then off), and sends telemetry in fixed slots (`Sender`).
 //!
-//! Pure, without a clock: one step a slot of 1 ms, in the idle loop.
+//! Pure, without a clock: one step per slot of 1 ms, in the idle loop.
 
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! Parameters: what is set once for a drive, whatever its machine. Kept in RAM; a reset brings the defaults back.
+//! Parameters: values that are set once for a drive, whatever its machine. They are kept in RAM; a reset restores the defaults.
 
 use crate::machine::Ratings;
 use crate::operator::{Settings, TrainLimits};
@@ -58,15 +58,15 @@ pub const RPM_PER_RAD_S: f32 = 60.0 / TAU;
 pub struct Parameters {
     /// Fastest change of the torque demand, in N·m/s.
     pub torque_slew_nm_s: f32,
-    /// Fastest change of that, in N·m/s².
+    /// Fastest change of the torque's rate, in N·m/s².
     pub torque_jerk_nm_s2: f32,
     /// Largest torque demand, in N·m.
     pub torque_limit_nm: f32,
-    /// Speed beyond which nothing accelerates, in r/min.
+    /// Speed beyond which the drive does not accelerate, in r/min.
     pub speed_limit_rpm: f32,
     /// Silence after which torque is zero, in ms.
     pub command_zero_ms: f32,
-    /// Silence after which the drive stops, in ms; counted from the same command.
+    /// Silence after which the drive stops, in ms; counted from the same command as the one above.
     pub command_off_ms: f32,
     /// Largest line current while motoring, in A.
     pub line_current_motoring_a: f32,
@@ -92,7 +92,7 @@ pub enum WriteError {
 }
 
 impl Parameters {
-    /// As the machine is rated, slew and jerk as the operator's usual ones.
+    /// The values as the machine is rated, with the operator's usual slew and jerk.
     pub const fn rated(ratings: &Ratings) -> Self {
         let usual = Settings::rated(ratings, 0.0, None);
         Self {
@@ -110,7 +110,7 @@ impl Parameters {
         }
     }
 
-    /// Limits of line and acceleration.
+    /// The limits of line and acceleration.
     pub fn train(&self) -> TrainLimits {
         TrainLimits {
             motoring_a: self.line_current_motoring_a,
@@ -144,8 +144,8 @@ impl Parameters {
         copy.slot(id).copied()
     }
 
-    /// Writes a parameter, or leaves everything as it is. Slew, torque and speed reach as far as the machine's ratings at most, and
-    /// torque is zero before the drive stops.
+    /// Writes a parameter, or leaves everything as it is. Slew, torque and speed are limited to the machine's ratings, and the time-out to zero
+    /// torque must not be longer than the one to stop.
     pub fn write(&mut self, id: u8, value: f32, ratings: &Ratings) -> Result<(), WriteError> {
         let known = PARAMETERS.iter().find(|parameter| parameter.id == id).ok_or(WriteError::Unknown)?;
         let rated = Self::rated(ratings);

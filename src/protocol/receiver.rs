@@ -1,5 +1,5 @@
-//! The frames that take effect. A frame is judged in this order: identifier, length, CRC, counter, content; the first that is wrong
-//! rejects it whole, and is counted.
+//! The frames that take effect. A frame is judged in this order: identifier, length, CRC, counter, content; the first error rejects the whole frame,
+//! and is counted.
 
 use super::e2e::{self, Order, Sequence};
 use super::frame::{Frame, LENGTH};
@@ -13,21 +13,21 @@ use super::telemetry::Counts;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Reject {
-    /// Its identifier is none of ours.
+    /// Its identifier is not one of ours.
     Unknown,
     /// It is not eight bytes long.
     Truncated,
     /// Its CRC is wrong, or it came under another message's identifier.
     Corrupted,
-    /// It has the counter of the one before.
+    /// It has the same counter as the one before.
     Repeated,
-    /// Its counter is too far from the last: it is old, or too many are lost.
+    /// Its counter is too far from the last: it is old, or too many frames are lost.
     Disordered,
     /// A value is out of its range, or an unused bit is set.
     OutOfRange,
 }
 
-/// One message's place in its sequence.
+/// One message's state in its sequence.
 #[derive(Clone, Copy, Debug, Default)]
 struct Channel {
     sequence: Sequence,
@@ -54,10 +54,10 @@ impl Channel {
     }
 }
 
-/// After this silence a message other than the command begins anew, in ms.
+/// Silence after which a message other than the command begins anew, in ms.
 const SILENCE_MS: u32 = 1_000;
 
-/// Messages to a drive, at most.
+/// Most messages to a drive.
 const MOST: usize = 5;
 
 /// The receiver of all messages to a drive.
@@ -89,7 +89,7 @@ impl<D: MessageSet> Receiver<D> {
         Self { channels: [Channel::NEW; MOST], counts, message_set: core::marker::PhantomData }
     }
 
-    /// So many slots of a millisecond pass; the command begins anew after a silence of `command_ms`.
+    /// Lets this many slots of a millisecond pass; the command begins anew after a silence of `command_ms`.
     pub fn wait(&mut self, slots: u32, command_ms: u32) {
         let mut longest_ms = command_ms;
         for channel in &mut self.channels {
@@ -103,7 +103,7 @@ impl<D: MessageSet> Receiver<D> {
         &self.counts
     }
 
-    /// A frame, its signals on these scales.
+    /// Judges a frame whose signals are on these scales.
     pub fn receive(&mut self, frame: &Frame, scales: Scales) -> Result<D::Content, Reject> {
         let verdict = self.judge(frame, scales);
         let counts = &mut self.counts;

@@ -1,4 +1,4 @@
-//! Scales: the worth of a signal's step, a power of ten that follows from the machine's ratings.
+//! Scales: the size of a signal's step, a power of ten that follows from the machine's ratings.
 
 use super::commands::{LINK_V, TORQUE_NM};
 use super::parameters::RPM_PER_RAD_S;
@@ -8,7 +8,7 @@ use core::f32::consts::TAU;
 use tractive_control::named;
 
 named! {
-    /// A physical quantity whose signals' steps follow from the machine, by its exponent's place among the bits of [`Scales`].
+    /// A physical quantity whose signals' steps follow from the machine; the number is the position of its exponent among the bits of [`Scales`].
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     #[cfg_attr(feature = "defmt", derive(defmt::Format))]
     #[repr(u8)]
@@ -21,23 +21,23 @@ named! {
         Voltage = 8 => "voltage",
         /// Speed and frequency.
         Speed = 12 => "speed",
-        /// Whatever has the same steps on every machine.
+        /// Signals with the same steps on every machine.
         Fixed = 16 => "fixed",
     }
 }
 
 impl Quantity {
-    /// Those that follow from the machine.
+    /// The quantities whose steps follow from the machine.
     pub const SCALED: [Self; 4] = [Self::Torque, Self::Current, Self::Voltage, Self::Speed];
 }
 
 /// Bits of an exponent, in two's complement.
 const BITS: u32 = 4;
 const NIBBLE: u32 = 0xF;
-/// The exponents' ends.
+/// The limits of the exponents.
 const EXPONENTS: [i32; 2] = [-4, 4];
 
-/// The worth of each exponent by its bits: 0 to 7, then −8 to −1.
+/// The factor of each exponent by its bits: 0 to 7, then −8 to −1.
 const WORTH: [f32; 16] =
     [1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1];
 
@@ -45,17 +45,17 @@ const fn worth(exponent: i32) -> f32 {
     WORTH[(exponent as u32 & NIBBLE) as usize]
 }
 
-/// Steps in a rating, at least.
+/// Fewest steps in a rating.
 const FEWEST_STEPS: f32 = 500.0;
 
-/// The part of a rated torque that can be told.
+/// Range that must be representable, as a multiple of the rated torque.
 const TORQUE_MARGIN: f32 = 1.5;
 
-/// The part of the ZS9's highest capacitor voltage that can be told.
+/// Range that must be representable, as a multiple of the ZS9's highest capacitor voltage.
 const CAPACITOR_MARGIN: f32 = 1.5;
 
-/// 0, the usual step; a tenth of it, and again, while a rating has less than 500 steps; ten times that while the most that is to be told,
-/// as a share of the usual range, lies beyond it.
+/// 0 for the usual step. A tenth of it, and so on, while a rating has less than 500 steps; then ten times it, and so on, while the largest value to
+/// be sent, as a share of the usual range, lies beyond that range.
 const fn exponent(rated_steps: f32, most: f32) -> i32 {
     let [lowest, highest] = EXPONENTS;
     let mut exponent = 0;
@@ -68,7 +68,7 @@ const fn exponent(rated_steps: f32, most: f32) -> i32 {
     exponent
 }
 
-/// The worth of a step of every quantity, as powers of ten of the usual one: four bits each.
+/// The size of a step of every quantity, as powers of ten of the usual one: four bits each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Scales(u32);
@@ -77,18 +77,18 @@ impl Scales {
     /// The usual steps of every quantity.
     pub const USUAL: Self = Self(0);
 
-    /// Those of a machine.
+    /// The scales of a machine.
     pub const fn of(ratings: &Ratings) -> Self {
         Self::up_to(ratings, ratings.trip_dc_over_v)
     }
 
-    /// Those of two machines on a ZS9, by its operator's ratings. At which capacitor voltage it trips is the power stage's matter, of which a
-    /// host knows nothing: the highest one in normal operation is the measure.
+    /// The scales of two machines on a ZS9, from its operator's ratings. The capacitor voltage at which the drive trips belongs to the power stage,
+    /// of which a host knows nothing: so the highest voltage in normal operation is the measure.
     pub const fn of_zs9(ratings: &Ratings) -> Self {
         Self::up_to(ratings, CAPACITOR_MARGIN * ratings.dc_link_max_v)
     }
 
-    /// With voltages up to this one, in V.
+    /// The scales with voltages up to this one, in V.
     const fn up_to(ratings: &Ratings, most_v: f32) -> Self {
         let rpm = RPM_PER_RAD_S * ratings.max_speed_rad_s;
         let trip_rpm = RPM_PER_RAD_S * ratings.trip_speed_rad_s / SPEED_RPM[1];
@@ -114,7 +114,7 @@ impl Scales {
         ((self.bits(quantity) << unused) as i32) >> unused
     }
 
-    /// Usual steps in one of a quantity's.
+    /// The number of usual steps in one step of a quantity.
     pub const fn worth(self, quantity: Quantity) -> f32 {
         worth(self.bits(quantity) as i32)
     }
@@ -134,14 +134,14 @@ impl Scales {
         mask
     }
 
-    /// The four bits by which a message tells the exponents of the quantities under its mask: the exclusive or of them.
+    /// The four bits by which a message gives the exponents of the quantities under its mask: their exclusive or.
     pub(super) const fn code(self, mask: u32) -> u32 {
         let exponents = self.0 & mask;
         let folded = exponents ^ exponents >> (2 * BITS);
         (folded ^ folded >> BITS) & NIBBLE
     }
 
-    /// A value as it is on the usual scales.
+    /// A value converted to the usual scales.
     #[inline]
     pub(super) const fn to_usual(self, quantity: Quantity, value: f32) -> f32 {
         value * worth(-(self.bits(quantity) as i32))
@@ -181,7 +181,7 @@ mod tests {
         assert!(most.into_iter().all(|(most, exponent)| super::exponent(1e3, most) == exponent));
         let rated = [(500.0, 0), (499.0, -1), (50.0, -1), (49.0, -2), (0.05, -4), (1e-9, -4)];
         assert!(rated.into_iter().all(|(rated, exponent)| super::exponent(rated, 0.0) == exponent));
-        // Room comes before fineness.
+        // Range takes precedence over resolution.
         assert_eq!(super::exponent(1.0, 0.005), -2);
     }
 

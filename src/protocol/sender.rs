@@ -1,4 +1,4 @@
-//! The slot of each frame: fixed places in a cycle of 100 ms, so that the bus load is the same whatever happens.
+//! The slot of each frame: fixed places in a cycle of 100 ms, so that the bus load is always the same.
 
 use super::e2e::Counter;
 use super::frame::Frame;
@@ -17,9 +17,9 @@ const FAULT_VALUE: usize = 4;
 const FAULT_LIMIT: usize = 5;
 const COUNTERS: usize = 6;
 const ANSWER: usize = 7;
-/// A fourth message of measurements, where a drive has one.
+/// A fourth message of measurements, if a drive has one.
 const MORE: usize = 8;
-/// The temperatures, where a drive has them.
+/// The temperatures, if a drive has them.
 const TEMPERATURES: usize = 9;
 
 /// Counters of all messages, and the place in the cycle.
@@ -33,7 +33,7 @@ pub struct Sender<D> {
 }
 
 impl<D: MessageSet> Sender<D> {
-    /// At the cycle's beginning.
+    /// The state at the cycle's beginning.
     pub const fn new() -> Self {
         Self {
             slot: 0,
@@ -44,7 +44,7 @@ impl<D: MessageSet> Sender<D> {
         }
     }
 
-    /// Sends this in the next free slot; it takes the place of an answer that still waits.
+    /// Sends this answer in the next free slot; it replaces an answer that still waits.
     pub fn answer(&mut self, answer: ParameterAnswer) {
         self.answer = Some(answer);
     }

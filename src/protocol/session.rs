@@ -1,4 +1,4 @@
-//! The drive's end: frames in, a request out; a status in, frames out. One step a slot of 1 ms, one frame a slot is sent at most.
+//! The drive's end: frames in, a request out; a status in, frames out. One step per slot of 1 ms; at most one frame is sent per slot.
 
 use super::commands::ParameterRequest;
 use super::frame::Frame;
@@ -30,11 +30,11 @@ pub struct Session<D: MessageSet> {
     scales: Scales,
     receiver: Receiver<D>,
     parameters: Parameters,
-    /// The content that was received last.
+    /// The content received last.
     said: D,
-    /// Slots since the newest command; `None` before the first, and after the time-out to off.
+    /// Slots since the newest command; `None` before the first one, and after the time-out to off.
     age_ms: Option<u32>,
-    /// `true` once a command at rest has come since the drive went off: before it no level counts.
+    /// `true` once a command at rest has come since the drive went off: before that no level counts.
     armed: bool,
     state: State,
     sender: Sender<D>,
@@ -57,7 +57,8 @@ impl<D: MessageSet> Session<D> {
         }
     }
 
-    /// The slot's first half, `slots` after the last one that was listened in: what has come since, and what is asked of the drive now.
+    /// The slot's first half, `slots` after the last one that was handled: takes the frames that have come since, and returns the present request to
+    /// the drive.
     pub fn listen<F: Borrow<Frame>>(
         &mut self,
         slots: u32,

@@ -1,8 +1,8 @@
-//! Signals: numbers and flags in a frame's 64 bits, by the description that the DBC file publishes.
+//! Signals: numbers and flags in a frame's 64 bits, according to the description that the DBC file publishes.
 
 use super::scales::{Quantity, Scales};
 
-/// The eight bytes of a frame as one number: bit 0 is the first byte's lowest.
+/// The eight bytes of a frame as one number: bit 0 is the lowest bit of the first byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Payload(pub u64);
@@ -33,11 +33,11 @@ impl core::fmt::Display for OutOfRange {
 
 impl core::error::Error for OutOfRange {}
 
-/// A signal. Little-endian; its value is `raw · scale + offset`, on the usual [scales](super::Scales). Its methods stay out of line: nothing here is in a hurry, and
-/// sixty signals would otherwise be sixty copies.
+/// A signal. Little-endian; its value is `raw · scale + offset`, on the usual [scales](super::Scales). Its methods stay out of line: nothing here is
+/// time-critical, and sixty signals would otherwise be sixty copies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Signal {
-    /// Name, with the unit where it has one.
+    /// Name, with the unit if it has one.
     pub name: &'static str,
     /// Unit.
     pub unit: &'static str,
@@ -74,8 +74,7 @@ impl Signal {
         Self::number(name, start, 1, 1)
     }
 
-    /// A physical value in 16 bits; signed where its smallest value is below zero. The raw numbers beyond its range
-    /// are free to say that there is none.
+    /// A physical value in 16 bits, signed if its smallest value is below zero. A raw number beyond its range is free to say that there is no value.
     pub const fn physical(
         name: &'static str,
         unit: &'static str,
@@ -88,7 +87,7 @@ impl Signal {
         Self { name, unit, start, bits: 16, kind, scale, offset, min, max, page, quantity }
     }
 
-    /// Any finite number, as it is.
+    /// Any finite number, unscaled.
     pub const fn float(name: &'static str, start: u32) -> Self {
         let (unit, kind, page) = ("", Kind::Float, None);
         Self {
@@ -106,17 +105,17 @@ impl Signal {
         }
     }
 
-    /// The same on one page of several.
+    /// The same signal on one page of several.
     pub const fn on_page(self, page: u32) -> Self {
         Self { page: Some(page), ..self }
     }
 
-    /// The same, in steps that follow from the machine.
+    /// The same signal, in steps that follow from the machine.
     pub const fn of(self, quantity: Quantity) -> Self {
         Self { quantity, ..self }
     }
 
-    /// The bits it takes.
+    /// The bits that the signal occupies.
     pub const fn mask(&self) -> u64 {
         self.ones().wrapping_shl(self.start)
     }
@@ -125,13 +124,13 @@ impl Signal {
         if self.bits >= 64 { u64::MAX } else { 1_u64.wrapping_shl(self.bits) - 1 }
     }
 
-    /// The bits as they are.
+    /// The raw bits.
     #[inline(never)]
     pub const fn raw(&self, payload: Payload) -> u32 {
         (payload.0.wrapping_shr(self.start) & self.ones()) as u32
     }
 
-    /// Sets the bits as they are; those too many are cut off.
+    /// Sets the raw bits; excess bits are cut off.
     #[inline(never)]
     pub const fn put_raw(&self, payload: &mut Payload, raw: u32) {
         payload.0 = payload.0 & !self.mask() | (raw as u64 & self.ones()).wrapping_shl(self.start);
@@ -142,7 +141,7 @@ impl Signal {
         self.raw(payload) != 0
     }
 
-    /// The value; `None` outside its range, which is also how "not available" is written.
+    /// The value; `None` outside its range, which is also the way "not available" is written.
     #[inline]
     pub fn get(&self, payload: Payload) -> Option<f32> {
         self.get_on(Scales::USUAL, payload)
@@ -167,7 +166,7 @@ impl Signal {
         inside.then_some((steps as f32 * self.scale + self.offset) * scales.worth(self.quantity))
     }
 
-    /// Sets the value, rounded to the nearest step; an error outside its range and for what is not finite.
+    /// Sets the value, rounded to the nearest step; an error if it is outside its range or not finite.
     #[inline]
     pub fn put(&self, payload: &mut Payload, value: f32) -> Result<(), OutOfRange> {
         self.put_on(Scales::USUAL, payload, value)
@@ -186,7 +185,7 @@ impl Signal {
         Ok(())
     }
 
-    /// Sets a measured value; where there is none, or it is outside the range, the raw number that says so.
+    /// Sets a measured value; if there is none, or it is outside the range, the raw number that says so.
     #[inline]
     pub fn put_measured(&self, payload: &mut Payload, value: Option<f32>) {
         self.put_measured_on(Scales::USUAL, payload, value);
@@ -200,7 +199,7 @@ impl Signal {
         }
     }
 
-    /// The raw number that says "not available": all ones, in two's complement the most negative number, of floats not a number.
+    /// The raw number that says "not available": all ones; for two's complement the most negative number; for floats NaN.
     pub const fn not_available(&self) -> u32 {
         match self.kind {
             Kind::Unsigned => self.ones() as u32,

@@ -16,11 +16,11 @@ use crate::operator::{Limits, MotorLimits, Request, TorqueDemand};
 use crate::ports::Report;
 use crate::thermal::Temperatures;
 
-/// The content of a frame that was taken.
+/// The content of an accepted frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Content {
-    /// The first of its message, or the first after a silence: it only set the counter.
+    /// The first frame of its message, or the first after a silence: it only set the counter.
     Greeting,
     /// A command.
     Command(Command),
@@ -41,7 +41,7 @@ pub struct Traction {
 }
 
 impl Traction {
-    /// The lower of the sender's limits and the parameters; as rated where nothing is said.
+    /// The lower of the sender's limits and the parameters; the rated ones if nothing was sent.
     fn limits(&self, parameters: &Parameters, ratings: &Ratings) -> Limits {
         let motor = motor_limits(self.torque_limits.as_ref(), parameters, ratings);
         let MotorLimits { motoring_nm, braking_nm, speed_rad_s } = motor;

@@ -1,4 +1,4 @@
-//! The ZS9's messages: those of the PMaSynRM drive, with two motors' demands, limits and measurements, and the link's.
+//! The ZS9's messages: those of the PMaSynRM drive, with the demands, limits and measurements of two motors, and the link's.
 
 use super::commands::{
     ACKNOWLEDGE, BRAKING, CHARGE, COAST, DISCHARGE as DISCHARGE_COMMAND, ENABLE, LINK_V, MOTORING, OFF,
@@ -41,7 +41,7 @@ const LINK: Signal = Signal::physical("link_v", "V", 16, 0.1, LINK_V).of(Quantit
 const CAPACITOR: Signal = Signal::physical("capacitor_v", "V", 32, 0.1, LINK_V).of(Quantity::Voltage);
 const DUTY: Signal = Signal::physical("duty_percent", "%", 48, 0.01, [0.0, 100.0]);
 
-/// Levels and demands: on page 0 torques, on page 1 speeds. Without it the drive does nothing.
+/// Levels and demands: torques on page 0, speeds on page 1. Without this message the drive does nothing.
 pub const ZS9_COMMAND: Message = Message::new(
     "ZS9_COMMAND",
     0x111,
@@ -63,17 +63,17 @@ pub const ZS9_COMMAND: Message = Message::new(
     ],
 )
 .telling(36, &[Quantity::Torque, Quantity::Speed]);
-/// Limits of torque and speed of the upper motor, of the lower one; as rated until they come.
+/// Limits of torque and speed of the upper motor and of the lower one; the rated ones until they come.
 pub const ZS9_LIMITS: [Message; 2] = [
     Message::new("ZS9_LIMITS_1", 0x112, 18, 100, &[MOTORING, BRAKING, SPEED_LIMIT])
         .telling(12, &[Quantity::Torque, Quantity::Speed]),
     Message::new("ZS9_LIMITS_2", 0x113, 19, 100, &[MOTORING, BRAKING, SPEED_LIMIT])
         .telling(12, &[Quantity::Torque, Quantity::Speed]),
 ];
-/// The link's voltage outside shoot-through; the nominal one until it comes.
+/// The link's voltage outside shoot-through; the nominal one until this message comes.
 pub const ZS9_LINK: Message =
     Message::new("ZS9_LINK", 0x114, 20, 100, &[LINK_REF]).telling(12, &[Quantity::Voltage]);
-/// Reads a parameter, or writes it.
+/// Reads or writes a parameter.
 pub const ZS9_PARAMETER_REQUEST: Message =
     Message::new("ZS9_PARAMETER_REQUEST", 0x115, 21, 0, &[WRITE, PARAMETER, VALUE]);
 
@@ -85,7 +85,8 @@ pub const ZS9_STATUS: Message = Message::new(
     10,
     &[STATE, FAULT, REFUSAL, REFUSALS, SCHEME, LISTENING, PRECHARGE, MAIN, DISCHARGE, CHOPPER, TAKEN],
 );
-// One tells torque's steps and the other current's; with the command's, which tells torque's and speed's together, none is misread.
+// One gives the steps of torque and the other those of current; together with the command, which gives those of torque and speed combined, none is
+// misread.
 const MOTOR_1: Message =
     Message::new("ZS9_MOTOR_1", 0x192, 23, 10, &[SPEED, TORQUE, CURRENT]).telling(12, &[Quantity::Torque]);
 const MOTOR_2: Message =
@@ -127,7 +128,7 @@ pub struct Zs9Command {
 }
 
 impl Zs9Command {
-    /// Nothing asked.
+    /// The command that asks for nothing.
     pub const AT_REST: Self = Self { levels: Levels::NONE, demands: Zs9Demands::Torques([0.0; 2]) };
 
     /// As a frame's content.
@@ -159,7 +160,7 @@ impl Zs9Command {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Zs9Link {
-    /// Link voltage wanted outside shoot-through, in V.
+    /// Desired link voltage outside shoot-through, in V.
     pub link_ref_v: f32,
 }
 
@@ -178,11 +179,11 @@ impl Zs9Link {
     }
 }
 
-/// The content of a frame that was taken.
+/// The content of an accepted frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Zs9Content {
-    /// The first of its message, or the first after a silence: it only set the counter.
+    /// The first frame of its message, or the first after a silence: it only set the counter.
     Greeting,
     /// A command.
     Command(Zs9Command),
@@ -221,7 +222,7 @@ pub struct Zs9Measured {
 }
 
 impl Zs9Measured {
-    /// Takes over what a message of the three says.
+    /// Adopts the content of one of the three messages.
     pub fn merge(&mut self, message: &Message, payload: Payload, scales: Scales) {
         let [first, second] = &mut self.motors;
         let motor = match message.id {
@@ -296,7 +297,7 @@ impl MessageSet for Zs9 {
         self.command = Zs9Command::AT_REST;
     }
 
-    /// Once the command is old, a speed demand becomes no torque.
+    /// Once the command is old, a speed demand becomes zero torque.
     fn request(&self, armed: bool, fresh: bool, parameters: &Parameters, ratings: &Ratings) -> DualRequest {
         let Zs9Command { levels, demands } = self.command;
         let wanted = match demands {

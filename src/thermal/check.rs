@@ -6,15 +6,15 @@ use tractive_control::configuration::{ABOVE_ZERO, Bound, Refused, within};
 
 /// Least distance between two temperatures of derating, in K.
 const APART_K: f32 = 1.0;
-/// The hottest that anything may be said to be, in °C.
+/// The highest temperature that a setting may give, in °C.
 const HOTTEST_C: f32 = 500.0;
 const COLDEST_C: f32 = -100.0;
 
 impl Thermal {
-    /// The check that these settings make sense: a board asks for it before its drive starts.
+    /// The check that these settings make sense; a board makes it before its drive starts.
     ///
     /// # Errors
-    /// The first scalar that does not.
+    /// The first scalar that does not make sense.
     pub const fn check(&self) -> Result<(), Refused> {
         let Self {
             winding_sensor,
@@ -77,7 +77,7 @@ impl Sensor {
 impl Rise {
     const fn check(&self) -> Result<(), Refused> {
         let Self { k_per_w, time_s } = *self;
-        // Slower, and a slot's change is lost in single precision; quicker, and a slot is a step of its own.
+        // If slower, a slot's change is lost in single precision; if quicker, a slot is a step of its own.
         within(&[
             Bound("thermal.rise.k_per_w", k_per_w, 0.0, 1e3),
             Bound("thermal.rise.time_s", time_s, 0.02, 600.0),

@@ -1,19 +1,19 @@
-//! Derating: torque that goes as a part gets hot.
+//! Derating: torque is reduced as a part gets hot.
 
 use crate::frames::limit;
 
-/// Temperatures of a part between which the torque goes, in °C.
+/// Temperatures of a part between which the torque is reduced to zero, in °C.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Derating {
-    /// Up to here the whole torque is left.
+    /// Temperature up to which the whole torque is left.
     pub from_c: f32,
-    /// From here on there is none; above `from_c`.
+    /// Temperature from which none is left; above `from_c`.
     pub none_c: f32,
 }
 
 impl Derating {
-    /// The share of the torque that a temperature in °C leaves; what is not a number leaves none.
+    /// The share of the torque that a temperature in °C leaves; NaN leaves none.
     pub fn share(&self, celsius: f32) -> f32 {
         if celsius < self.none_c {
             limit((self.none_c - celsius) / (self.none_c - self.from_c), 0.0, 1.0)

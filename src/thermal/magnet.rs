@@ -1,7 +1,8 @@
 //! The magnets' temperature, from the flux linkage that the drive has learned: magnets lose flux as they warm.
 //!
-//! What the drive tells of it is one number, the error of the flux linkage along itself. It is the magnets' alone where hardly a current flows or the gates are off; and what is
-//! not temperature (a magnet's tolerance, an error of the link's sensor, which looks the same) shows as temperature: 1 % as 10 K.
+//! The drive reports a single number for it, the error of the flux linkage along itself. It belongs to the magnets alone if hardly any current flows
+//! or the gates are off. Errors of other origin (a magnet's tolerance, an error of the link's sensor, which looks the same) show as temperature: 1 %
+//! as 10 K.
 
 use super::Load;
 use super::derate::Derating;
@@ -12,18 +13,18 @@ use super::derate::Derating;
 pub struct Magnets {
     /// Change of their flux linkage with temperature, as a share per K: −0.001 of neodymium, −0.002 of ferrite.
     pub per_k: f32,
-    /// Temperature at which they have the flux map's flux linkage, in °C.
+    /// Temperature at which they have the flux linkage of the flux map, in °C.
     pub map_c: f32,
-    /// The torque that hot magnets leave; an estimate trips nothing.
+    /// The torque that hot magnets leave; an estimate never trips the drive.
     pub derating: Derating,
 }
 
 /// Share of the largest current below which the flux linkage is the magnets'.
 const SMALL: f32 = 0.05;
-/// Time for which the current must have been small, in s: forty of the means that the error is learnt from.
+/// Time for which the current must have been small, in s: forty of the means from which the error is learnt.
 const SETTLED_S: f32 = 1.0;
 
-/// The estimate, in °C, and for how long the current has been small, in s.
+/// The estimate, in °C, and the time for which the current has been small, in s.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MagnetState {
     celsius: Option<f32>,
@@ -33,13 +34,13 @@ pub(super) struct MagnetState {
 impl MagnetState {
     pub const UNKNOWN: Self = Self { celsius: None, small_s: 0.0 };
 
-    /// One slot; the estimate stays while it cannot be renewed.
+    /// One slot; the estimate is kept while it cannot be renewed.
     pub fn step(&mut self, load: &Load, magnets: &Magnets, slot_s: f32) -> Option<f32> {
         let is_small = load.reference_a < SMALL * load.max_current_a && load.map_error != 0.0;
         self.small_s = if is_small { self.small_s + slot_s } else { 0.0 };
         let celsius = magnets.map_c + load.map_error / magnets.per_k;
         if self.small_s > SETTLED_S && celsius.is_finite() {
-            // The count needs no end.
+            // The count need not go further.
             (self.celsius, self.small_s) = (Some(celsius), 2.0 * SETTLED_S);
         }
         self.celsius
@@ -68,7 +69,7 @@ mod tests {
         }
         let celsius = state.celsius.unwrap();
         assert!((celsius - 100.0).abs() < 1e-3, "{celsius}");
-        // With a current, or at a speed that tells nothing, it stays.
+        // With a current, or at a speed that reveals nothing, it is kept.
         assert_eq!(state.step(&load(100.0, -0.01), &MAGNETS, 1e-3), Some(celsius));
         assert_eq!(state.step(&load(5.0, 0.0), &MAGNETS, 1e-3), Some(celsius));
     }

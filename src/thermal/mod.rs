@@ -1,8 +1,8 @@
-//! The temperatures of winding, heat sink, junction and magnets: what the sensors show, what the losses add where no sensor is, and the share of
-//! the torque that they leave.
+//! The temperatures of winding, heat sink, junction and magnets: the sensors' readings, the rise from losses at places without a sensor, and the
+//! share of the torque that they leave.
 //!
-//! One pure step a slot of the operator. A sensor that is unplugged, shorted or out of its range is a named fault; a part that gets hot
-//! takes torque away, and only past where nothing is left of it the drive trips.
+//! One pure step per slot of the operator. A sensor that is unplugged, shorted or out of its range is a named fault. A hot part reduces the torque;
+//! the drive trips only beyond the temperature at which no torque is left.
 
 #![forbid(unsafe_code)]
 
@@ -34,19 +34,19 @@ pub struct Thermal {
     pub heat_sink_sensor: Sensor,
     /// Stator resistance of a phase at 20 °C, in ohm.
     pub resistance_ohm: f32,
-    /// The winding's hottest place above its sensor, by the copper loss of all phases.
+    /// The rise of the winding's hottest place above its sensor, from the copper loss of all phases.
     pub winding: Rise,
-    /// A device's junction above the heat sink, by the loss of one device.
+    /// The rise of a device's junction above the heat sink, from the loss of one device.
     pub junction: Rise,
     /// Losses of a device.
     pub losses: DeviceLosses,
     /// The torque that a hot winding leaves.
     pub winding_derating: Derating,
-    /// The temperature of it that trips the drive, above where derating ends, in °C.
+    /// The winding's temperature that trips the drive, above the end of derating, in °C.
     pub winding_trip_c: f32,
     /// The torque that a hot junction leaves.
     pub junction_derating: Derating,
-    /// The temperature of it that trips the drive, in °C.
+    /// The junction's temperature that trips the drive, in °C.
     pub junction_trip_c: f32,
     /// The magnets; `None`: nothing is known of them.
     pub magnets: Option<Magnets>,
@@ -60,16 +60,17 @@ impl Thermal {
     }
 }
 
-/// Time for which a sensor must be wrong, or a part too hot, in s: far below what either takes, and longer than what a disturbed conversion does.
+/// Time for which a sensor must be wrong, or a part too hot, in s: far below the time that either takes, and longer than a disturbed conversion
+/// lasts.
 pub const PERSISTENCE_S: f32 = 0.01;
 
-/// The voltages across the sensors over those across sensor and series resistor together, in 65,536ths.
+/// The ratios of the voltage across each sensor to the voltage across sensor and series resistor together, in 65,536ths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ratios {
-    /// Of the winding's sensor.
+    /// The winding's sensor.
     pub winding: u16,
-    /// Of the heat sink's.
+    /// The heat sink's.
     pub heat_sink: u16,
 }
 
@@ -83,13 +84,13 @@ pub struct Load {
     pub reference_a: f32,
     /// Voltage of the DC link, in V.
     pub udc_v: f32,
-    /// By how much the flux linkage seems to exceed the map's, as a share; 0 while that is not known.
+    /// Share by which the flux linkage seems to exceed the map's; 0 while that is not known.
     pub map_error: f32,
     /// The machine's largest current, in A.
     pub max_current_a: f32,
 }
 
-/// The temperatures, and what they leave of the torque.
+/// The temperatures, and the torque that they leave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Temperatures {
@@ -108,23 +109,23 @@ pub struct Temperatures {
 /// The state of the temperatures.
 #[derive(Clone, Copy, Debug)]
 pub struct ThermalState {
-    /// The last good readings, in °C: winding, heat sink.
+    /// The last valid readings, in °C: winding, heat sink.
     read_c: [Option<f32>; 2],
     winding: RiseState,
     junction: RiseState,
     magnets: MagnetState,
-    /// Slots for which each failed has lasted: the sensors' in the order of `read_c`, winding, junction.
+    /// Slots for which each failed check has persisted: the sensors in the order of `read_c`, winding, junction.
     lasted: [u32; 4],
 }
 
 impl ThermalState {
-    /// Before the first reading, nothing warmer than its sensor.
+    /// The state before the first reading, with nothing warmer than its sensor.
     pub const fn new() -> Self {
         let (winding, junction) = (RiseState::NONE, RiseState::NONE);
         Self { read_c: [None; 2], winding, junction, magnets: MagnetState::UNKNOWN, lasted: [0; 4] }
     }
 
-    /// One slot. Returns the temperatures once both sensors have been read, and the first failed that lasts.
+    /// One slot. Returns the temperatures once both sensors have been read, and the first failed check that persists.
     #[inline(never)]
     pub fn step(
         &mut self,
@@ -180,7 +181,7 @@ impl ThermalState {
         Some(Temperatures { winding_c, heat_sink_c, junction_c, magnets_c, torque_share })
     }
 
-    /// The first failed that has lasted long enough.
+    /// The first failed check that has persisted long enough.
     fn persistent(&mut self, found: &[Option<FailedCheck>; 4], slot_s: f32) -> Option<FailedCheck> {
         let mut first = None;
         for (failed, lasted) in found.iter().zip(&mut self.lasted) {

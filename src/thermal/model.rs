@@ -1,6 +1,6 @@
-//! The warming of parts without a sensor above one that is measured: one state each, after a thermal resistance and a time constant.
+//! The rise of parts without a sensor above a measured temperature: one state each, with a thermal resistance and a time constant.
 
-/// The warming of a part above the one that is measured.
+/// The rise of a part above the measured one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rise {
@@ -22,7 +22,7 @@ pub struct DeviceLosses {
     pub switching_share: f32,
 }
 
-/// Share of the time in which a device conducts: at a standstill that of one with half duty; turning it is less.
+/// Share of the time in which a device conducts: that at standstill with half duty; when turning it is less.
 const CONDUCTS: f32 = 0.5;
 
 impl DeviceLosses {
@@ -33,21 +33,21 @@ impl DeviceLosses {
     }
 }
 
-/// Copper's resistance over that at 20 °C, at a temperature in °C.
+/// Ratio of copper's resistance at a temperature in °C to that at 20 °C.
 pub fn copper_factor(celsius: f32) -> f32 {
     1.0 + 3.93e-3 * (celsius - 20.0)
 }
 
-/// Mean square of the largest magnitude of three phase currents over that of their peak, 1/2 + 3√3/4π.
+/// Ratio of the mean square of the largest magnitude of three phase currents to that of their peak, 1/2 + 3√3/4π.
 const LARGEST: f32 = 0.913_5;
 
-/// Copper loss of three phases, in W, by their largest current in A: right on average of a machine that turns, at a standstill up to a tenth too
-/// much.
+/// Copper loss of three phases, in W, from their largest current in A: correct on average for a turning machine, up to a tenth too high at
+/// standstill.
 pub(crate) fn copper_w(current_a: f32, ohm: f32) -> f32 {
     1.5 / LARGEST * ohm * current_a * current_a
 }
 
-/// A part's warming, in K.
+/// The rise of a part, in K.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RiseState(f32);
 
@@ -59,7 +59,7 @@ impl RiseState {
         kelvin
     }
 
-    /// One slot with a loss, in W; what is not a number has its own fault, and leaves it as it is.
+    /// One slot with a loss, in W; a NaN loss has its own fault, and leaves the rise unchanged.
     pub fn step(&mut self, loss_w: f32, rise: &Rise, slot_s: f32) -> f32 {
         let Self(kelvin) = self;
         if loss_w.is_finite() {

@@ -1,4 +1,4 @@
-//! A resistive sensor to ground behind a series resistor to the converter's reference: from the ratio of the voltages to a temperature.
+//! A resistive sensor to ground, in series with a resistor to the converter's reference: a temperature from the ratio of the voltages.
 
 use crate::frames::limit;
 
@@ -23,23 +23,23 @@ pub enum Element {
 pub struct Sensor {
     /// Its element.
     pub element: Element,
-    /// Resistor between it and the reference, in ohm.
+    /// Resistor between sensor and reference, in ohm.
     pub series_ohm: f32,
-    /// Lowest and highest temperature that it can show, in °C: what is beyond is a wire.
+    /// Lowest and highest temperature that it can show, in °C: a value beyond them means a faulty wire.
     pub range_c: [f32; 2],
 }
 
-/// Converter's counts in its reference.
+/// Converter's counts at its reference.
 const FULL: f32 = 65_536.0;
-/// Highest temperature that is told, in °C.
+/// Highest temperature that is reported, in °C.
 const HOTTEST_C: f32 = 1_000.0;
 const ZERO_C_K: f32 = 273.15;
-/// Ratios beyond which the element is as good as shorted, or unplugged.
+/// Ratios beyond which the element counts as shorted, or unplugged.
 const SHORTED: f32 = 1e-3;
 const OPEN: f32 = 1.0 - 1e-3;
 
 impl Sensor {
-    /// The temperature at a ratio, in °C; out of the range that, and the limit that it broke.
+    /// The temperature at a ratio, in °C; out of its range, that temperature and the limit that it broke.
     pub fn read(&self, ratio: u16) -> Result<f32, (f32, f32)> {
         let [lowest_c, highest_c] = self.range_c;
         let share = limit(f32::from(ratio) / FULL, SHORTED, OPEN);
@@ -102,7 +102,7 @@ mod tests {
         (ohm / (ohm + f64::from(series_ohm)) * 65_536.0).round() as u16
     }
 
-    /// Resistance after the law, in double precision.
+    /// Resistance according to the law, in double precision.
     fn ohm(sensor: &Sensor, celsius: f64) -> f64 {
         match sensor.element {
             Element::Ntc { at_25_ohm, beta_k } => {
@@ -144,7 +144,7 @@ mod tests {
                 let (value, broken) = sensor.read(ratio).unwrap_err();
                 assert!(broken == limit && (f64::from(value) - beyond).abs() < 0.3, "{value} for {beyond}");
             }
-            // Every ratio ends in a number.
+            // Every ratio gives a number.
             for ratio in 0..=u16::MAX {
                 assert!(sensor.read(ratio).unwrap_or_else(|(value, _)| value).is_finite());
             }

@@ -1,4 +1,4 @@
-//! The ZS9's blocks: the same three streams and the same tags, other contents.
+//! The ZS9's blocks: the same three streams and the same tags, with other contents.
 
 use super::{Block, block, filled, line_from_words, line_to_words, told_from_words, told_to_block};
 use crate::cell::Words;
@@ -15,12 +15,12 @@ use crate::protocol::Frame;
 use crate::recorder::DualRecord;
 use crate::time::Instant;
 
-/// The values that the rig tells the image before anything starts.
+/// The values that the rig sends to the image before anything starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DualSetup {
     /// Carrier period, in ticks.
     pub carrier_ticks: u32,
-    /// Dead time where two gates of a leg exchange, in ticks.
+    /// Dead time between two gates of a leg, in ticks.
     pub dead_time_ticks: u32,
     /// The line side that the operator switches; `None`: no operator, the rig commands the drive directly.
     pub line: Option<LineTimes>,
@@ -43,15 +43,15 @@ pub enum DualRequest {
     GatesOff(Instant),
     /// The processor has stopped in a panic or a HardFault, gates off.
     Dead,
-    /// A control period from the flight recorder, the oldest first; after the last answer, if a fault has frozen it.
+    /// A control period from the flight recorder, the oldest first; sent after the last answer, if a fault has frozen it.
     Recorded(DualRecord),
-    /// The image has nothing more to say.
+    /// The image has nothing more to send.
     End,
     /// The gates may be played again.
     Leave(Instant),
-    /// The frame that has come, and what the board says, in the slot that began at the instant.
+    /// The question for a received frame and the board's feedback, in the slot that began at the instant.
     Ask(Instant),
-    /// The operator's status, and the frame that carries it; both from the instant on.
+    /// The operator's status, and the frame that carries it; both hold from the instant on.
     Tell(Instant, DualStatus, Option<Frame>),
 }
 
@@ -79,7 +79,7 @@ impl DualRequest {
         }
     }
 
-    /// From a block; `None` if it is none of ours.
+    /// From a block; `None` if it is not one of ours.
     pub fn from_block(block: &Block) -> Option<Self> {
         let [tag, at, payload @ ..] = *block;
         let at = Instant(at);
@@ -112,7 +112,7 @@ impl DualRequest {
     }
 }
 
-/// The words of a report that the rig is told: not what it has measured itself.
+/// The words of a report that are sent to the rig: without those that it has measured itself.
 fn told_of(report: &DualReport) -> [u32; 10] {
     let [a, b, c, d, e, f, g, h, i, j, ..] = report.to_words();
     [a, b, c, d, e, f, g, h, i, j]
@@ -162,7 +162,7 @@ pub fn dual_sample_to_block(sample: &DualSample, command: &DualDriveCommand, sto
     ]
 }
 
-/// The inverse of [`dual_sample_to_block`], the command as its words.
+/// The inverse of [`dual_sample_to_block`], with the command as its words.
 pub fn dual_sample_from_block(block: &Block) -> (DualSample, [u32; 4], bool) {
     let [
         a1,
@@ -196,7 +196,7 @@ pub fn dual_sample_from_block(block: &Block) -> (DualSample, [u32; 4], bool) {
     (sample, [demand1, demand2, link, flags], flags & 2 != 0)
 }
 
-/// The command of such words.
+/// The command from such words.
 pub fn dual_command_from_words([demand1, demand2, link, flags]: [u32; 4]) -> DualDriveCommand {
     DualDriveCommand {
         enable: flags & 1 != 0,

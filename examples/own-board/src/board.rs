@@ -1,4 +1,5 @@
-//! The board: registers on the one side, the library's ports on the other: two for the interrupts, one for the idle loop. The addresses are placeholders for your chip's.
+//! The board: registers on one side, the library's ports on the other, two for the interrupts and one for the idle loop. The addresses are
+//! placeholders for your chip's.
 
 use crate::machine::BUILT_IN;
 use tractive::frames::{Abc, Angle};
@@ -10,15 +11,15 @@ use tractive::time::{Clock, Instant};
 
 /// 21 MHz ticks; control at 10 kHz.
 pub const CLOCK: Clock = Clock::new(21_000_000, 2_100);
-/// The switches' shortest pulse, 3 µs.
+/// The shortest pulse of the switches, 3 µs.
 pub const MIN_PULSE_TICKS: u32 = 63;
 
-/// Amperes per converter code, and the code of no current.
+/// Amperes per converter code, and the code at zero current.
 const AMPERE_PER_CODE: f32 = 0.05;
 const ZERO_CODE: i32 = 2_048;
 /// Volts of the DC link per converter code.
 const VOLT_PER_CODE: f32 = 0.2;
-/// Counts of the encoder's turn, electrical.
+/// Counts per turn of the encoder, electrical.
 const COUNTS: u32 = 4_096;
 
 /// Data registers of the converters, the encoder's count, three compare registers, the gates' enable.
@@ -57,7 +58,7 @@ pub fn gates_off() {
     write(GATES, 0);
 }
 
-/// Clocks, pins, converters and timers, in the order that your chip asks for, gates off.
+/// Sets up clocks, pins, converters and timers, in the order that your chip requires, with the gates off.
 pub fn start() {
     gates_off();
 }

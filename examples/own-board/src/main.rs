@@ -1,8 +1,8 @@
-//! A firmware with a board of its own: what a user of the library writes. Two interrupts, their vector table, a board that implements
-//! the ports, and the tables of the machine in `machine/`.
+//! A firmware with a board of its own: the code that a user of the library writes. It consists of two interrupts, their vector table, a board that
+//! implements the ports, and the tables of the machine in `machine/`.
 //!
-//! The registers in [`board`] are an example's: pulses go to three compare registers, samples come from the converters' data
-//! registers. Put your chip's in their place; everything else stays.
+//! The registers in [`board`] are those of an example: pulses go to three compare registers, samples come from the converters' data registers.
+//! Replace them by your chip's; everything else can stay.
 #![no_std]
 #![no_main]
 
@@ -28,17 +28,17 @@ const SETTINGS: Settings = Settings {
     ..Settings::new(CLOCK, SwitchLimits::new(MIN_PULSE_TICKS, 0, BUILT_IN.ratings.max_switching_hz, &CLOCK))
 };
 
-/// The tables and the settings are refused by name when this does not compile.
+/// If this does not compile, the tables or the settings are refused by name.
 const _: () = if let Err(refused) = SETTINGS.check(&BUILT_IN) {
     panic!("{}", refused.name)
 };
 
 static SHARED: Shared = Shared::new();
 
-/// A value that one interrupt alone uses.
+/// A value that only one interrupt uses.
 struct Own<T>(UnsafeCell<T>);
 
-// SAFETY: each is touched by the one interrupt that names it, which does not preempt itself.
+// SAFETY: each is touched only by the one interrupt that names it, which does not preempt itself.
 unsafe impl<T> Sync for Own<T> {}
 
 static CONTROL: Own<ControlTask<BuiltIn>> =
@@ -62,7 +62,7 @@ fn main() -> ! {
 /// The control timer's interrupt, of low priority.
 #[unsafe(no_mangle)]
 extern "C" fn TIM2() {
-    // SAFETY: this interrupt alone uses it.
+    // SAFETY: only this interrupt uses it.
     let task = unsafe { &mut *CONTROL.0.get() };
     task.run(&mut Board, &SHARED);
 }
@@ -70,7 +70,7 @@ extern "C" fn TIM2() {
 /// The PWM timer's interrupt, of high priority: at each carrier boundary, and when control asks for a revision.
 #[unsafe(no_mangle)]
 extern "C" fn TIM1_UP() {
-    // SAFETY: this interrupt alone uses it.
+    // SAFETY: only this interrupt uses it.
     let task = unsafe { &mut *PWM.0.get() };
     task.run(&mut Board, &SHARED);
 }

@@ -1,4 +1,4 @@
-//! The chip's interrupts, in the order of their numbers: two are used.
+//! The chip's interrupts, in the order of their numbers; two of them are used.
 
 /// An entry of the vector table.
 #[derive(Clone, Copy)]
@@ -15,7 +15,7 @@ unsafe extern "C" {
 /// Interrupts of the chip.
 const COUNT: usize = 82;
 
-/// The vector table behind the processor's own exceptions.
+/// The vector table after the processor's own exceptions.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [Vector; COUNT] = {

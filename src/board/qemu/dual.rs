@@ -1,4 +1,4 @@
-//! The emulated board for the ZS9. The nine gates' compare registers are words on the link: the emulator has none.
+//! The emulated board for the ZS9. The compare registers of the nine gates are words on the link: the emulator has none.
 //!
 //! The PWM timer comes at the carrier's peaks, the control timer at its valleys. A carrier period that is not written in time turns the
 //! gates off ([`watch`]).
@@ -22,7 +22,7 @@ use core::sync::atomic::Ordering;
 /// The ZS9's flight recorder. The rig reads it when the run is over.
 pub static DUAL_RECORDER: DualRecorder = DualRecorder::new();
 
-/// Opens the link and fetches the set-up. Call once, before [`start_dual`].
+/// Opens the link and fetches the set-up. To be called once, before [`start_dual`].
 pub fn connect_dual() -> DualSetup {
     let setup = exchange::open_dual();
     OPERATED.store(setup.line.is_some(), Ordering::Relaxed);
@@ -51,7 +51,7 @@ impl ControlPort<Dual> for Control {
         sample
     }
 
-    /// The scheme is the rig's in any case, and the link's voltage until the operator names one.
+    /// The scheme is always the rig's, and so is the link's voltage until the operator gives one.
     fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
         if !OPERATED.load(Ordering::Relaxed) {
             return exchange::command_dual();
@@ -122,7 +122,7 @@ impl OperatorPort<DualDemands> for DualIdle {
     }
 }
 
-/// Gates off, whatever state the program is in, then the end: for panics and HardFaults.
+/// Turns the gates off, whatever state the program is in, and ends: for panics and HardFaults.
 pub fn die_dual() -> ! {
     exchange::dead_dual();
     stop(false)

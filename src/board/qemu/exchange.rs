@@ -1,5 +1,5 @@
-//! The exchange with the rig, over four semihosting files. A real board has nothing of this: `cargo xtask timing` knows
-//! these functions by their module and does not count them, so they stay out of line and take what they tell by reference.
+//! The exchange with the rig, over four semihosting files. A real board has none of this: `cargo xtask timing` recognises these functions by their
+//! module and does not count them, so they stay out of line and take their data by reference.
 
 mod dual;
 
@@ -31,7 +31,7 @@ const CONTROL_ANSWERS: usize = 1;
 pub const PWM_ANSWERS: usize = 2;
 const IDLE_ANSWERS: usize = 3;
 
-/// The words of the rig's command beside the newest sample.
+/// The words of the rig's command that came with the newest sample.
 static COMMAND: [AtomicU32; 4] = [const { AtomicU32::new(0) }; 4];
 
 /// Opens the files and fetches the set-up.
@@ -43,7 +43,7 @@ pub fn open() -> Setup {
     wire::setup_from_block(&block)
 }
 
-/// The same, with where MTPA starts.
+/// The same, with the start of MTPA.
 #[inline(never)]
 pub fn open_with_start() -> (Setup, MtpaStart) {
     open_files();
@@ -86,7 +86,7 @@ fn keep<const N: usize>(words: [u32; N]) {
     }
 }
 
-/// The rig's command beside the newest sample.
+/// The rig's command that came with the newest sample.
 #[inline(never)]
 pub fn command() -> DriveCommand {
     wire::command_from_words(kept())
@@ -109,7 +109,7 @@ pub fn align(now: Instant, zero: Angle) {
     send(&Request::Align(now, zero).to_block());
 }
 
-/// Tells what a flight recorder holds, if a fault has frozen it, and ends the emulation.
+/// Sends the contents of a flight recorder, if a fault has frozen it, and ends the emulation.
 #[inline(never)]
 fn finish<T: Words<N>, const N: usize, const RECORDS: usize>(
     recorder: &Ring<T, N, RECORDS>,
@@ -162,7 +162,7 @@ pub fn leave(now: Instant) {
     send(&Request::Leave(now).to_block());
 }
 
-/// The request to the operator. The idle loop's answers have a stream of their own: an interrupt may ask while it waits.
+/// The request to the operator. The idle loop's answers have their own stream: an interrupt may ask while it waits.
 #[inline(never)]
 pub fn ask(at: Instant) -> (operator::Request, Feedback, Option<Frame>) {
     let mut block = Request::Ask(at).to_block();
@@ -182,7 +182,7 @@ pub fn dead() {
     send(&Request::Dead.to_block());
 }
 
-/// Says on the emulator's standard error what of the configuration is refused.
+/// Names the refused part of the configuration on the emulator's standard error.
 #[inline(never)]
 pub fn refused(name: &str) {
     const APPEND: usize = 8;
@@ -213,7 +213,7 @@ pub fn send(block: &Block) {
     }
 }
 
-/// Sends a request and puts the answer in its place.
+/// Sends a request and replaces it by the answer.
 #[inline(never)]
 pub fn exchange(block: &mut Block, answers: usize) {
     send(block);

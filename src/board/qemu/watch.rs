@@ -1,5 +1,5 @@
-//! The watch over the ZS9's carrier periods: what the next one plays has to be written before the valley where it takes over, or the gates
-//! go off, whatever the tasks know. A watchdog of the board's counts from each write to that valley; its interrupt cannot be masked.
+//! The watch over the ZS9's carrier periods: the next period's pulses must be written before the valley where they take over; otherwise the gates go
+//! off, whatever the state of the tasks. A watchdog of the board counts from each write to that valley; its interrupt cannot be masked.
 
 use super::{PWM_TIMER, exchange, read_register, write_register};
 use crate::ports::HardwareBreak;
@@ -7,7 +7,7 @@ use crate::protection::Fault;
 use crate::time::Instant;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
-/// The CMSDK watchdog; it counts the timers' ticks down from what is written.
+/// The CMSDK watchdog; it counts down from the written value, in the timers' ticks.
 const LOAD: usize = 0x4000_8000;
 const CONTROL: usize = LOAD + 8;
 const CLEAR: usize = LOAD + 0xC;
@@ -17,45 +17,45 @@ const INTERRUPT: u32 = 1;
 static HALF_TICKS: AtomicU32 = AtomicU32::new(0);
 /// Instant of the peak whose interrupt wrote last.
 static WRITTEN_AT: AtomicU32 = AtomicU32::new(0);
-/// It has turned the gates off.
+/// `true` once the watch has turned the gates off.
 static ENDED: AtomicBool = AtomicBool::new(false);
 
-/// Begins, with the first peak half a carrier period ahead.
+/// Starts the watch, with the first peak half a carrier period ahead.
 pub fn start(half_ticks: u32) {
     HALF_TICKS.store(half_ticks, Relaxed);
     write_register(LOAD, 2 * half_ticks);
     write_register(CONTROL, INTERRUPT);
 }
 
-/// Ends for good.
+/// Ends the watch for good.
 pub fn stop() {
     write_register(CONTROL, 0);
 }
 
-/// The period from the next valley on is written: the one after it must be by the valley behind the next peak.
+/// The period from the next valley on is written: the one after it must be written by the valley after the next peak.
 #[inline]
 pub fn written(now: Instant) {
     WRITTEN_AT.store(now.0, Relaxed);
     write_register(LOAD, read_register(PWM_TIMER + 4) + HALF_TICKS.load(Relaxed));
 }
 
-/// The watchdog's interrupt: the valley is there and nothing was written.
+/// The watchdog's interrupt: the valley has come and nothing was written.
 pub fn ends() {
     write_register(CLEAR, 1);
     if !ENDED.swap(true, Relaxed) {
         let valley = Instant(WRITTEN_AT.load(Relaxed)).after(3 * HALF_TICKS.load(Relaxed));
-        // The bench knows control's orders by their instants, and this one comes a moment after the valley.
+        // The bench identifies control's orders by their instants, and this one comes a moment after the valley.
         exchange::gates_off(valley.after(1));
     }
 }
 
-/// The break that it found; it holds until the gates are let go.
+/// The break that the watch found; it holds until the gates are released.
 #[inline]
 pub fn found() -> Option<HardwareBreak> {
     ENDED.load(Relaxed).then_some(HardwareBreak { fault: Fault::PwmDeadline, seen: 1 })
 }
 
-/// The gates are let go.
+/// Notes that the gates are released.
 pub fn forget() {
     ENDED.store(false, Relaxed);
 }

@@ -10,25 +10,25 @@ use crate::machine::Tables;
 use crate::ports::MotorDemand;
 use crate::protection::{self, FailedCheck, Fault, FrozenWatch, UnexplainedWatch};
 
-/// Natural frequency of the speed tracker, in rad/s: the speed loop's phase needs it quick.
+/// Natural frequency of the speed tracker, in rad/s: the phase of the speed loop requires a fast one.
 pub const TRACKING_RAD_S: f32 = 4000.0;
 pub use crate::protection::INNOVATION_RAD;
-/// Time over which the speed may change, in s. So a sensor that begins to count the other way is found where it is too slow for an
+/// Time over which a change of the speed is checked, in s. The check finds a sensor that begins to count the other way at a speed too low for an
 /// innovation.
 const SLOW_S: f32 = 5e-3;
-/// Change of an electrical angle in that time, in rad, below which nothing is told from noise.
+/// Change of an electrical angle in that time, in rad, below which it cannot be told from noise.
 const LEAST_ASTRAY_RAD: f32 = 0.25;
-/// The voltage that the loop may ask for, as a share of the largest one that is to be had at every angle. The modulator gives what its
-/// hexagon has at the angle, up to 1.155, and tells.
+/// The voltage that the loop may ask for, as a share of the largest one that is available at every angle. The modulator gives as much as its hexagon
+/// has at the angle, up to 1.155, and reports it.
 const LOOP_SHARE: f32 = 1.15;
-/// Part of what the dead time may take that is left though it is made up for: legs that exchange twice within it, and edges beside a shoot-through.
-/// With a fifth of it, as legs of two gates have, 2 µs that are told cost 4 % of torque.
+/// Part of the dead time's possible effect that remains although it is compensated: legs that exchange twice within it, and edges beside a
+/// shoot-through. With a fifth of it, as for legs of two gates, a configured dead time of 2 µs costs 4 % of torque.
 const LEFT_SHARE: f32 = 0.5;
-/// Share of the largest voltage at every angle that the operating point may use; the rest regulates.
+/// Share of the largest voltage available at every angle that the operating point may use; the rest is for regulation.
 const STEADY_SHARE: f32 = 0.98;
 
-/// Change of an electrical angle in [`SLOW_S`] beyond which its sensor has lost the rotor, in rad: of a rotor that speeds up by so much, in rad/s², twice what it
-/// makes itself.
+/// Change of an electrical angle in [`SLOW_S`] beyond which its sensor has lost the rotor, in rad: that of a rotor with twice the acceleration, in
+/// rad/s², that it can reach itself.
 const fn astray_rad(most_acceleration_rad_s2: f32) -> f32 {
     let rad = 2.0 * most_acceleration_rad_s2 * (SLOW_S * SLOW_S);
     if rad > LEAST_ASTRAY_RAD { rad } else { LEAST_ASTRAY_RAD }
@@ -40,15 +40,15 @@ pub struct Axis<L> {
     speed_loop: SpeedLoop,
     watch: FrozenWatch,
     unexplained: UnexplainedWatch,
-    /// Electrical speed behind a filter, in rad/s.
+    /// Filtered electrical speed, in rad/s.
     slow: f32,
-    /// Mean voltage of the period that began at the last sample, per volt of link; and the link's voltage there.
+    /// Mean voltage of the period that began at the last sample, per volt of link, and the link's voltage at that sample.
     acting: Option<(AlphaBeta, f32)>,
     /// The volt-seconds of the period that ended at the newest operating point, in V·s.
     ended: Option<AlphaBeta>,
 }
 
-/// Everything that a motor's step works on.
+/// The inputs of a motor's step.
 pub struct AxisInput<'a> {
     pub measured: &'a Measurements,
     pub demand: &'a MotorDemand,
@@ -62,10 +62,10 @@ pub struct AxisInput<'a> {
     pub aims: bool,
 }
 
-/// A motor's step.
+/// The results of a motor's step.
 pub struct AxisOutput {
     pub command: MotorCommand,
-    /// The torque that is told of it, as in [`DualReport`](super::DualReport).
+    /// The torque that is reported for it, as in [`DualReport`](super::DualReport).
     pub torque_nm: f32,
     pub weakening: bool,
     /// Electrical power drawn from now on, in W.
@@ -73,7 +73,7 @@ pub struct AxisOutput {
 }
 
 impl AxisOutput {
-    /// While no pulses are made.
+    /// The output while no pulses are made.
     pub const NOTHING: Self = Self {
         command: MotorCommand { voltage_v: 0.0, angle: Angle::ZERO, rate: 0.0 },
         torque_nm: 0.0,
@@ -96,7 +96,7 @@ impl<L: ControlLaw> Axis<L> {
         }
     }
 
-    /// Follows the angle, where it is `trusted` whatever it is. Says by how much, in rad, it is off where that is too much.
+    /// Follows the angle, whatever it is if it is `trusted`. Returns its error, in rad, if that is too large.
     pub fn track(
         &mut self,
         angle: Angle,
@@ -125,7 +125,7 @@ impl<L: ControlLaw> Axis<L> {
         None
     }
 
-    /// The angle is not known: its sensor has `lost` the rotor if it was known before; and nobody may want pulses.
+    /// The angle is unknown: if it was known before, its sensor has `lost` the rotor; and nobody may ask for pulses.
     #[cold]
     #[inline(never)]
     pub fn lose_angle(&mut self, lost: Fault, enable: bool) -> Option<FailedCheck> {
@@ -147,7 +147,7 @@ impl<L: ControlLaw> Axis<L> {
         self.controller.speed_is_known()
     }
 
-    /// While the gates are off.
+    /// Resets the state while the gates are off.
     pub fn idle(&mut self) {
         self.controller.idle();
         self.speed_loop = SpeedLoop::new();
@@ -156,7 +156,7 @@ impl<L: ControlLaw> Axis<L> {
         self.acting = None;
     }
 
-    /// Measurements that no longer move; `lost` is the fault when it is the angle.
+    /// The check for measurements that no longer move; `lost` is the fault if it is the angle.
     #[inline(always)]
     pub fn check_frozen(
         &mut self,
@@ -171,25 +171,25 @@ impl<L: ControlLaw> Axis<L> {
         if self.watch.angle_stands() { Some((lost, turned_rad, limit_rad)) } else { Some(failed) }
     }
 
-    /// A voltage that nothing explains.
+    /// The check for a voltage that nothing explains.
     #[inline(always)]
     pub fn check_voltage(&self, tables: &Tables) -> Option<FailedCheck> {
         self.unexplained.check(tables)
     }
 
-    /// One control period; what comes of it goes where it stays.
+    /// One control period; the results are written in place.
     #[inline(never)]
     pub fn step(&mut self, input: &AxisInput, settings: &Settings, tables: &Tables, output: &mut AxisOutput) {
         let omega = self.controller.omega();
         let period_s = settings.clock.control_s();
         let begins = input.applied.map(|share| self.mean_per_volt(&share, settings));
         let before = core::mem::replace(&mut self.acting, begins.map(|mean| (mean, input.link_v)));
-        // The link moves along a straight line in between.
+        // The link's voltage moves along a straight line in between.
         let ended = before.map(|(mean, link_v)| mean * (0.5 * (link_v + input.link_v) * period_s));
         let committed = Committed {
             horizon_s: period_s,
             volt_seconds: begins.map(|mean| mean * (input.link_v * period_s)),
-            // A period is its own mirror image, so at its ends the ripple is nothing.
+            // A period is its own mirror image, so the ripple is zero at its ends.
             ripple_wb: None,
             interval_s: period_s,
         };
@@ -205,7 +205,7 @@ impl<L: ControlLaw> Axis<L> {
             self.controller.aim(&AimInput::plain(&demand, input.measured.udc_v, &limits), &law);
             self.ended = ended;
         } else {
-            // Since it learnt last: the noise of the sample between drops out.
+            // Since the last learning: the noise of the sample in between drops out.
             let boundary = Boundary {
                 volt_seconds: self.ended.zip(ended).map(|(earlier, later)| earlier + later),
                 length_s: TURNS as f32 * period_s,
@@ -223,24 +223,24 @@ impl<L: ControlLaw> Axis<L> {
         output.command.rate = settings.clock.angle_rate(omega);
         output.torque_nm = target.torque_nm;
         output.weakening = target.region != Region::Mtpa;
-        // Of the voltage that begins to act now, as the modulator really gives it, at the measured current.
+        // Power of the voltage that begins to act now, as the modulator really gives it, at the measured current.
         output.power_w =
             begins.map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke()));
     }
 
-    /// Finds what the machine differs by from its map, of what nothing explains, while pulses are made on a link of `link_v`.
+    /// Finds the machine's differences from its map in the voltage that nothing explains, while pulses are made on a link of `link_v`.
     pub fn explain(&mut self, link_v: f32, settings: &Settings, tables: &Tables) {
         let law = Law { gains: &settings.gains, clock: &settings.clock, tables };
         self.controller.explain(dead_time(link_v, settings), &law);
     }
 
-    /// The torque that is asked for, by the operator or by the speed loop.
+    /// The torque that the operator or the speed loop asks for.
     fn demand(&mut self, input: &AxisInput, omega: f32, settings: &Settings, tables: &Tables) -> Demand {
         let rated_nm = tables.ratings.max_torque_nm;
         let largest_nm = if input.speed_torque_nm < rated_nm { input.speed_torque_nm } else { rated_nm };
         match input.demand {
             MotorDemand::Torque(demand) => {
-                // A speed loop that follows goes on from here.
+                // A speed loop that takes over later continues from here.
                 self.speed_loop = SpeedLoop::at(demand.torque_nm);
                 *demand
             }
@@ -256,9 +256,9 @@ impl<L: ControlLaw> Axis<L> {
         }
     }
 
-    /// Mean voltage of a control period per volt of link: of its carrier periods, the first of which is known, each turned on by one
-    /// carrier period. Together they have the direction of their middle, and the chord's length instead of the arc's: its square
-    /// term is short of it by less than 3e-6 at 400 Hz.
+    /// Mean voltage of a control period per volt of link: that of its carrier periods, of which the first is known and each is turned by one carrier
+    /// period from the one before. Together they have the direction of their middle, and the chord's length instead of the arc's: its square term is
+    /// short of it by less than 3e-6 at 400 Hz.
     fn mean_per_volt(&self, share: &MotorShare, settings: &Settings) -> AlphaBeta {
         let (omega, control_s) = (self.controller.omega(), settings.clock.control_s());
         let carrier_s = settings.clock.seconds(settings.carrier_ticks as i32);
@@ -270,7 +270,7 @@ impl<L: ControlLaw> Axis<L> {
     }
 }
 
-/// The dead time that is told, on a link of `link_v`.
+/// The configured dead time, on a link of `link_v`.
 #[inline]
 fn dead_time(link_v: f32, settings: &Settings) -> DeadTime {
     let of_two = DeadTime::of(settings.dead_time_ticks, settings.carrier_ticks, link_v, &settings.clock);
@@ -301,7 +301,7 @@ mod tests {
 
     const SETTINGS: Settings = Settings::new(Clock::new(25_000_000, 2_500), 2_500, &BUILT_IN);
 
-    /// The time, in s, that it takes to notice that a sensor which followed `omega`, electrical in rad/s, follows `then` of that time.
+    /// The time, in s, until it is noticed that a sensor which followed `omega`, electrical in rad/s, follows `then` of that time.
     fn noticed_s(omega: f64, then: impl Fn(f64) -> f64) -> Option<f64> {
         let mut axis = Axis::new(Controller::with_tracking(TRACKING_RAD_S));
         let (period_s, mut radians) = (f64::from(SETTINGS.clock.control_s()), 0.0);
@@ -317,14 +317,14 @@ mod tests {
         times_s.into_iter().find(|t_s| follow(then(*t_s)).is_some())
     }
 
-    /// From 250 rad/s on the very next angle is off; below, a sensor that counts the other way is found by where the speed goes.
+    /// From 250 rad/s on, the very next angle is off; below, a sensor that counts the other way is found by the course of the speed.
     #[test]
     fn a_sensor_that_counts_the_other_way_is_found_at_low_speed_too_and_a_quick_rotor_is_not() {
         for omega in [-240.0, -100.0, -40.0, 40.0, 100.0, 240.0] {
             let found_s = noticed_s(omega, |_| -omega);
             assert!(found_s.is_some_and(|found_s| found_s < 5e-3), "{omega} rad/s: {found_s:?}");
         }
-        // Full torque: half of what is allowed.
+        // Full torque: half of the allowed acceleration.
         for rad_s2 in [-5_000.0, 5_000.0] {
             assert_eq!(noticed_s(100.0, |t_s| 100.0 + rad_s2 * t_s), None, "{rad_s2} rad/s²");
         }
@@ -333,7 +333,7 @@ mod tests {
         assert_eq!(astray_rad(20_000.0), 1.0);
     }
 
-    /// A jump of the angle is told by its size, and a sensor that is trusted may jump; a lost angle's speed is known anew only after a while.
+    /// A jump of the angle is reported with its size, but a trusted sensor may jump; after a lost angle the speed is known again only after a while.
     #[test]
     fn a_jump_of_the_angle_is_told_unless_it_is_trusted() {
         for (jump_rad, trusted, told) in [(1.0, false, true), (-1.0, false, true), (1.0, true, false)] {

@@ -16,14 +16,14 @@ use core::sync::atomic::Ordering;
 
 type Input<'a> = PeriodInput<'a, Dual>;
 
-/// Corner of the filter on the voltage limit, in Hz: fed by the link as it is, the limit would make it oscillate.
+/// Corner of the filter on the voltage limit, in Hz: fed with the unfiltered link voltage, the limit would make it oscillate.
 const LIMIT_FILTER_HZ: f32 = 10.0;
-/// A motor has at most U_c/(2√3). The link of a two-level inverter whose six-step fundamental is as large, as a share of U_c.
+/// A motor has at most U_c/(2√3). This is the link of a two-level inverter with an equally large six-step fundamental, as a share of U_c.
 pub(crate) const TWO_LEVEL_SHARE: f32 = FRAC_PI_4 / SQRT_3;
 /// The name of a lost sensor, by motor.
 const SENSOR_LOST: [Fault; 2] = [Fault::SensorLost1, Fault::SensorLost2];
 
-/// The ZS9's control task, for a machine and a control law, once a motor.
+/// The ZS9's control task, for a machine and with one control law per motor.
 pub struct ControlTask<M = &'static Tables, L = Controller<false>> {
     machine: M,
     settings: Settings,
@@ -31,16 +31,16 @@ pub struct ControlTask<M = &'static Tables, L = Controller<false>> {
     link: ZSource,
     /// The results of the last period.
     driven: Driven,
-    /// `true` if the upper motor had a new operating point in it.
+    /// `true` if the upper motor had a new operating point in that period.
     upper_aims: bool,
-    /// Capacitor voltage behind the filter, in V; `None` before the first sample.
+    /// Filtered capacitor voltage, in V; `None` before the first sample.
     filtered_v: Option<f32>,
     /// Nominal instant of the next call.
     now: Instant,
     masked: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
-    /// `true` once the operator was asked for a command: who is not asked is not told.
+    /// `true` once the operator was asked for a command; an operator who is not asked gets no reports.
     operated: bool,
     slots: SlotTimer,
 }
@@ -49,12 +49,12 @@ pub struct ControlTask<M = &'static Tables, L = Controller<false>> {
 struct Driven {
     motors: [AxisOutput; 2],
     duty: f32,
-    /// The reference that is told of it, as in [`DualReport`].
+    /// The reference that is reported, as in [`DualReport`].
     inductor_ref_a: f32,
 }
 
 impl Driven {
-    /// While no pulses are made.
+    /// The results while no pulses are made.
     const NOTHING: Self = Self { motors: [AxisOutput::NOTHING; 2], duty: 0.0, inductor_ref_a: 0.0 };
 }
 
@@ -67,7 +67,7 @@ impl<M: Machine> ControlTask<M> {
 }
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
-    /// The same with other control laws, at rest: the upper motor's, the lower motor's.
+    /// The same task with other control laws, at rest: the upper motor's, the lower motor's.
     pub const fn with_laws(machine: M, settings: Settings, upper: L, lower: L) -> Self {
         Self {
             machine,
@@ -86,36 +86,36 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
-    /// The same where the timers start at another instant than 0.
+    /// The same task with timers that start at another instant than 0.
     pub fn beginning_at(mut self, origin: Instant) -> Self {
         self.now = origin.after(self.settings.clock.control_ticks);
         self
     }
 
-    /// The same without a check.
+    /// The same task without a check.
     pub const fn without(mut self, masked: MaskedFaults) -> Self {
         self.masked = masked;
         self
     }
 
-    /// Another dead time, in ticks; before the first call.
+    /// Sets another dead time, in ticks; before the first call.
     pub fn set_dead_time(&mut self, dead_time_ticks: u32) {
         self.settings.dead_time_ticks = dead_time_ticks;
     }
 
-    /// Another carrier period than that of the settings it was built with, in ticks; before the first call.
+    /// Sets another carrier period than that of the settings it was built with, in ticks; before the first call.
     pub fn set_carrier(&mut self, carrier_ticks: u32) {
         self.settings.carrier_ticks = carrier_ticks;
     }
 
-    /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant,
-    /// when the command must be there; a missed one is a fault.
+    /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant, when the command
+    /// must be available; a missed deadline is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort<Dual>, shared: &Shared) {
         let now = self.now;
         port.begin(false);
         self.now = now.after(self.settings.clock.control_ticks);
         shared.began.store(now.0, Ordering::Relaxed);
-        // First of all: the next peak writes it again.
+        // First of all: the next peak overwrites it.
         let newest = shared.applied.read();
         let applied = newest.filter(|applied| now.reached(applied.at));
         let sample = port.sample(now);
@@ -129,18 +129,18 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
         let input = Input { sample: &sample, command: &command };
         let Input { sample, command } = input;
-        // Once the PWM interrupt has: what it told before that cannot come back.
+        // Only after the PWM interrupt has released: the trip that it reported before cannot return.
         let released = applied.as_ref().map(|applied| applied.released);
         if self.acknowledge.step(command.acknowledge, self.trip.is_some(), released) {
             self.trip = None;
             self.axes.iter_mut().for_each(Axis::recover_angle);
         }
         if let (None, Some(trip)) = (self.trip, newest.and_then(|newest| newest.trip)) {
-            // Also from beyond this call: only where calls of it have been lost.
+            // Also a trip from after this call's instant: that only happens if calls of it have been lost.
             self.trip = Some(trip);
         }
         if let Some(HardwareBreak { fault, seen }) = sample.hardware {
-            // That the gates are held, or did not do what they were told, is only what comes of it.
+            // Gates that are held, or that did not follow their orders, are only a consequence of this fault.
             self.trip = self.trip.filter(|trip| !matches!(trip.fault, Fault::GatesHeld | Fault::LegStuck));
             self.check(Some((fault, f32::from(seen), 0.0)), port);
         }
@@ -177,8 +177,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.tell(input, gates, port, shared);
     }
 
-    /// The period as the flight recorder and whoever watches see it. Out of line: nothing of it is on the stack while the control
-    /// laws are.
+    /// The period as the flight recorder and any observer see it. Out of line: none of it is on the stack while the control laws are.
     #[inline(never)]
     fn tell(&mut self, input: Input, gates: Gates, port: &mut impl ControlPort<Dual>, shared: &Shared) {
         let now = self.now.before(self.settings.clock.control_ticks);
@@ -245,7 +244,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.trip
     }
 
-    /// The PWM interrupt that should have come since the last one seen and has not: since when, in s.
+    /// The failed check of a PWM interrupt that should have come since the last one seen and has not; with its delay, in s.
     fn overdue(&self, applied: &DualApplied, now: Instant) -> Option<FailedCheck> {
         let late = now.since(applied.at.after(self.settings.carrier_ticks));
         (late >= 0).then(|| (Fault::PwmDeadline, self.settings.clock.seconds(late), 0.0))
@@ -258,7 +257,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let enable = input.command.enable;
         let upper = self.follow::<0>(first, enable);
         let lower = self.follow::<1>(second, enable);
-        // The upper motor's first, if both are lost.
+        // The upper motor's first if both are lost.
         self.check(upper, port);
         self.check(lower, port);
         [first.unwrap_or(Angle::ZERO), second.unwrap_or(Angle::ZERO)]
@@ -277,12 +276,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
-    /// The measurements for the control law: the link as a two-level inverter's that can give as much.
+    /// The measurements for the control law, with the link as that of a two-level inverter of equal output.
     fn measured(&mut self, sample: &DualSample, [first, second]: [Angle; 2]) -> [Measurements; 2] {
         let before_v = self.filtered_v.unwrap_or(sample.capacitor_v);
         let share = TAU * LIMIT_FILTER_HZ * self.settings.clock.control_s();
         let filtered_v = before_v + share * (sample.capacitor_v - before_v);
-        // What is not finite trips, and must not stay.
+        // A value that is not finite trips, and must not stay in the filter.
         self.filtered_v = filtered_v.is_finite().then_some(filtered_v);
         let udc_v = TWO_LEVEL_SHARE * filtered_v;
         let [upper, lower] = sample.currents_a;
@@ -309,13 +308,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             && check_demand(of_upper).is_none()
             && check_demand(of_lower).is_none();
         if !sound {
-            // Copies: what stands behind a reference is in memory in every period.
+            // Copies: a value behind a reference would be in memory in every period.
             let measured = *measured;
             self.find_fault(input, &measured, port);
         }
     }
 
-    /// The fault of a period's input, where it has one.
+    /// The fault of a period's input, if it has one.
     #[cold]
     #[inline(never)]
     fn find_fault(&mut self, input: Input, measured: &[Measurements; 2], port: &mut impl ControlPort<Dual>) {
@@ -364,7 +363,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let (a1, a2) = applied.map_or((None, None), |[a1, a2]| (Some(a1), Some(a2)));
         let (settings, tables) = (&self.settings, self.machine.tables());
         let [l1, l2] = command.speed_torque_nm;
-        // The operating points in turn: the lower motor's in the periods between.
+        // The operating points alternate: the lower motor's is made in the periods between.
         self.upper_aims = !self.upper_aims;
         let turns = [self.upper_aims, !self.upper_aims];
         let motors = &mut self.driven.motors;
@@ -423,7 +422,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 }
 
-/// Any finite number is a demand, which the envelope limits.
+/// The check of a demand: any finite number is one, which the envelope limits.
 fn check_demand(demand: &MotorDemand) -> Option<FailedCheck> {
     match demand {
         MotorDemand::Torque(demand) => protection::check_demand(demand),

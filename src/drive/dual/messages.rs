@@ -29,7 +29,7 @@ pub struct DualCommand {
     pub motors: [MotorCommand; 2],
     /// Instant of the sample.
     pub at: Instant,
-    /// From when on the command may be used: a fixed time after its sample, whenever the task really finished.
+    /// The instant from which the command may be used: a fixed time after its sample, whenever the task really finished.
     pub valid_from: Instant,
     /// Shoot-through duty.
     pub duty: f32,
@@ -42,7 +42,7 @@ pub struct DualCommand {
 }
 
 impl DualCommand {
-    /// Of a command where it lies, from when on it may be used.
+    /// The instant from which a stored command may be used.
     #[inline]
     pub fn valid_from(record: &Record<10>) -> Instant {
         Instant(record.word::<7>())
@@ -95,7 +95,7 @@ pub struct MotorShare {
     pub angle: Angle,
 }
 
-/// From the modulator to control: what the period gives that begins at the next valley.
+/// From the modulator to control: the output of the period that begins at the next valley.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DualApplied {
@@ -105,7 +105,7 @@ pub struct DualApplied {
     pub next: Option<[MotorShare; 2]>,
     /// A fault that the PWM interrupt found.
     pub trip: Option<Trip>,
-    /// Number of the release that it carried out last.
+    /// Number of the release carried out last.
     pub released: u8,
 }
 

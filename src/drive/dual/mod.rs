@@ -7,15 +7,15 @@
 //!    │            │            │ which is played here ───│
 //! ```
 //!
-//! Logical execution time: control samples at a valley of the carrier, and its command may be used from the last peak before the
-//! next sample on: there the PWM interrupt loads the carrier period that begins at the next valley. So a voltage acts one
-//! period after its sample, and lasts one. Both interrupts look at each other's words by their instants. At 20 kHz a control
-//! period holds two carrier periods: each command is played twice, the vectors turned on.
+//! Logical execution time: control samples at a valley of the carrier, and its command may be used from the last peak before the next sample on. At
+//! that peak the PWM interrupt loads the carrier period that begins at the next valley. So a voltage acts one period after its sample, and lasts one
+//! period. Both interrupts select each other's words by their instants. At 20 kHz a control period holds two carrier periods: each command is played
+//! twice, with the vectors turned further the second time.
 //!
-//! The modulator divides by the link voltage that the PWM interrupt measures, so a link that moves hardly reaches the
-//! motors; the link's own control looks at the motors' power before it is drawn.
+//! The modulator divides by the link voltage that the PWM interrupt measures, so a change of the link voltage hardly reaches the motors; the link's
+//! own control sees the motors' power before it is drawn.
 //!
-//! One fault stops both motors: they share the bridge, and one leg holds a switch of each.
+//! A single fault stops both motors: they share the bridge, and one leg holds a switch of each.
 
 mod axis;
 mod control;
@@ -37,12 +37,12 @@ pub(crate) use control::TWO_LEVEL_SHARE;
 pub use messages::{DualApplied, DualCommand, MotorCommand, MotorShare};
 pub use pwm::PwmTask;
 
-/// Steps of the compare registers in one tick of the timers' clock: 1.25 ns at 25 MHz, as high-resolution timers have them. With
-/// whole ticks the rounding alone would shake each motor's torque by some hundredths of a N·m.
+/// Steps of the compare registers per tick of the timers' clock: 1.25 ns at 25 MHz, as high-resolution timers have them. With whole ticks the
+/// rounding alone would shake each motor's torque by some hundredths of a N·m.
 pub const COMPARE_STEPS: u32 = 32;
 
-/// Share of the nominal source's voltage from which on the capacitors count as charged: at rest they have the source's, which may be
-/// that low.
+/// Share of the nominal source's voltage from which on the capacitors count as charged: at rest they have the source's voltage, which may be that
+/// low.
 pub const LOWEST_SHARE: f32 = 0.9;
 
 /// Longest dead time that the gates' hardware may insert, in s.
@@ -57,9 +57,9 @@ pub(crate) const TURNS: u32 = 2;
 pub struct Settings {
     /// The timers' clock and the control period.
     pub clock: Clock,
-    /// Carrier period, in ticks: the control period or a whole part of it, even, at most 4,000.
+    /// Carrier period, in ticks: the control period or an integer fraction of it, even, at most 4,000.
     pub carrier_ticks: u32,
-    /// The dead time where two gates of a leg exchange, in ticks, which the pulses make up for; 0: none.
+    /// Dead time between two gates of a leg, in ticks, which the pulses compensate; 0: none.
     pub dead_time_ticks: u32,
     /// The current loops' gains.
     pub gains: Gains,
@@ -74,7 +74,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The ZS9's for two machines of a kind, with a carrier period in ticks.
+    /// The ZS9's settings for two machines of one kind, with a carrier period in ticks.
     pub const fn new(clock: Clock, carrier_ticks: u32, tables: &Tables) -> Self {
         let Tables { ratings, z_source, .. } = tables;
         let period_s = clock.control_ticks as f32 * clock.tick_s;
@@ -83,7 +83,7 @@ impl Settings {
             clock,
             carrier_ticks,
             dead_time_ticks: 0,
-            // What is learnt is learnt in every other period, from both.
+            // Learning takes place in every other period, from both motors.
             gains: Gains {
                 carrier: 0.6,
                 observer: TURNS as f32 * 0.02,
@@ -101,22 +101,21 @@ impl Settings {
         }
     }
 
-    /// The ratings as the operator looks at them: link voltages are those of the capacitors, and its trip levels the drive's own.
+    /// The ratings as the operator uses them: link voltages are those of the capacitors, with the drive's own trip levels.
     pub const fn operator_ratings(ratings: &Ratings) -> Ratings {
         Ratings {
             dc_link_min_v: LOWEST_SHARE * ratings.dc_link_min_v / TWO_LEVEL_SHARE,
             dc_link_nominal_v: ratings.dc_link_nominal_v / TWO_LEVEL_SHARE,
             dc_link_max_v: ratings.dc_link_max_v / TWO_LEVEL_SHARE,
             trip_dc_over_v: ratings.trip_dc_over_v / TWO_LEVEL_SHARE,
-            // Once the gates go off, what is above the source's voltage swings as far below it; a source that is lost has a limit
-            // of its own.
+            // Once the gates go off, the part above the source's voltage swings as far below it; a lost source has a limit of its own.
             trip_dc_under_v: 0.5 * ratings.trip_dc_under_v / TWO_LEVEL_SHARE,
             ..*ratings
         }
     }
 
-    /// The lowest and the highest link voltage outside shoot-through that an operator may ask for, and what holds until it does, in V,
-    /// by such ratings.
+    /// The lowest and the highest link voltage outside shoot-through that an operator may ask for, and the one that holds until then, in V, for such
+    /// ratings.
     pub const fn link_range_v(ratings: &Ratings) -> [f32; 3] {
         let source_v = ratings.dc_link_min_v / LOWEST_SHARE;
         [source_v, 2.0 * ratings.dc_link_max_v - source_v, 2.0 * ratings.dc_link_nominal_v - source_v]
@@ -127,7 +126,7 @@ impl Settings {
         self.carrier_ticks / 2
     }
 
-    /// From a control sample to when its command may be used, in ticks: the last peak before the next sample.
+    /// Time from a control sample until its command may be used, in ticks: until the last peak before the next sample.
     pub const fn deadline_ticks(&self) -> u32 {
         self.clock.control_ticks.saturating_sub(self.carrier_ticks / 2)
     }
@@ -137,8 +136,8 @@ impl Settings {
         self.carrier_ticks / 2 * COMPARE_STEPS
     }
 
-    /// Compare steps for which a gate may pause in a carrier half and yet must be seen on: what the longest dead time and the one that is
-    /// told leave of the half. M is on before its pause and after it, and a dead time may take either.
+    /// Compare steps for which a gate may pause in a carrier half and yet must be seen on: the part of the half that the longest and the configured
+    /// dead time leave. M is on before its pause and after it, and a dead time may take either.
     pub const fn longest_pause_steps(&self) -> u32 {
         let dead_ticks = (DEAD_TIME_S * self.clock.ticks_per_s) as u32 + self.dead_time_ticks;
         self.half_steps().saturating_sub(dead_ticks * COMPARE_STEPS)
@@ -149,7 +148,7 @@ impl Settings {
 pub struct Shared<'a> {
     command: Mailbox<DualCommand, 10>,
     applied: Seqlock<DualApplied, 10>,
-    /// Instant of the newest control interrupt, from its beginning on.
+    /// Instant of the newest control interrupt, from the beginning of that interrupt on.
     began: AtomicU32,
     /// Between the operator in the idle loop and control.
     pub operator: DualOperatorMailboxes,

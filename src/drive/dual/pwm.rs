@@ -11,12 +11,12 @@ use crate::protection::{self, FailedCheck, Fault, MaskedFaults, SafeState, Trip}
 use crate::time::Instant;
 use core::sync::atomic::Ordering;
 
-/// The largest move of the link in a carrier period that is believed, over the source's nominal voltage; more is an error of the measurement.
+/// Largest credible move of the link in a carrier period, over the source's nominal voltage; a larger one is a measurement error.
 const MOST_MOVED_SHARE: f32 = 0.025;
-/// Least link voltage that is divided by, over the source's nominal voltage.
+/// Least link voltage used as a divisor, over the source's nominal voltage.
 const LEAST_LINK_SHARE: f32 = 0.125;
 
-/// Phase current, as a share of the largest, whose sign may change within a period.
+/// Phase current, as a share of the largest, below which the sign may change within a period.
 const SMALL_CURRENT_SHARE: f32 = 0.05;
 
 /// The ZS9's PWM task.
@@ -27,15 +27,15 @@ pub struct PwmTask<M = &'static Tables> {
     longest_pause_steps: u32,
     /// Nominal instant of the next call: a peak.
     now: Instant,
-    /// The period that begins at the next valley; made where it stays.
+    /// The period that begins at the next valley, made in place.
     next: PlayedPeriod,
-    /// The states that the gates should have shown in the period that was played before, and in the one that is played.
+    /// The states that the gates should have shown in the period played before, and in the one that is being played.
     expected: [Expected; 2],
     masked: MaskedFaults,
     trip: Option<Trip>,
     /// Link voltage at the last peak, in V.
     last_link_v: Option<f32>,
-    /// Number of the release that was carried out last.
+    /// Number of the release carried out last.
     released: u8,
 }
 
@@ -56,33 +56,33 @@ impl<M: Machine> PwmTask<M> {
         }
     }
 
-    /// The same where the timers start at another instant than 0.
+    /// The same task with timers that start at another instant than 0.
     pub fn beginning_at(mut self, origin: Instant) -> Self {
         self.now = origin.after(self.settings.first_peak_ticks());
         self
     }
 
-    /// The same without a check.
+    /// The same task without a check.
     pub const fn without(mut self, masked: MaskedFaults) -> Self {
         self.masked = masked;
         self
     }
 
-    /// Another carrier period than that of the settings it was built with, in ticks; before the first call.
+    /// Sets another carrier period than that of the settings it was built with, in ticks; before the first call.
     pub fn set_carrier(&mut self, carrier_ticks: u32) {
         self.settings.carrier_ticks = carrier_ticks;
         self.longest_pause_steps = self.settings.longest_pause_steps();
         self.now = Instant(self.settings.first_peak_ticks());
     }
 
-    /// Another dead time, in ticks; before the first call.
+    /// Sets another dead time, in ticks; before the first call.
     pub fn set_dead_time(&mut self, dead_time_ticks: u32) {
         self.settings.dead_time_ticks = dead_time_ticks;
         self.longest_pause_steps = self.settings.longest_pause_steps();
     }
 
-    /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over. Says whether it
-    /// came for a peak.
+    /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over. Returns `true` if it came
+    /// for a peak.
     pub fn run(&mut self, port: &mut impl PwmPort<Dual>, shared: &Shared) -> bool {
         let peak = port.begin();
         if peak {
@@ -152,10 +152,10 @@ impl<M: Machine> PwmTask<M> {
         self.trip
     }
 
-    /// The command at the middle of the period that begins at the next valley, by the link as it will be there if it goes on.
+    /// The command at the middle of the period that begins at the next valley, for the link voltage extrapolated to there.
     fn request(&self, command: &DualCommand, sample: &PowerSample) -> Request {
         let link_v = link_v(sample);
-        // As far ahead as the last peak is back lies the middle of the period that is made here.
+        // The middle of the period that is made here lies as far ahead as the last peak lies back.
         let source_v = self.machine.tables().z_source.source_v;
         let (most_v, least_v) = (MOST_MOVED_SHARE * source_v, LEAST_LINK_SHARE * source_v);
         let moved_v = limit(link_v - self.last_link_v.unwrap_or(link_v), -most_v, most_v);
@@ -201,9 +201,9 @@ impl<M: Machine> PwmTask<M> {
             })
     }
 
-    /// Gates that were not seen as they should be since the last peak: in the falling half of the one period and the rising
-    /// half of the other. A pause must be seen in its rising half alone: the falling one may be over before the board has begun to look
-    /// anew, where it lies close around the peak.
+    /// The check for gates not seen as they should be since the last peak, that is, in the falling half of one period and the rising half of the
+    /// other. A pause is only required to be seen in its rising half: if it lies close around the peak, its falling half may be over before the board
+    /// has begun to look anew.
     fn stuck(&self, seen: &GateFeedback) -> Option<FailedCheck> {
         let [before, running] = &self.expected;
         let missing = (before.must_be_on | running.must_be_on) & !seen.on;
@@ -265,10 +265,10 @@ struct Expected {
 impl Expected {
     const OFF: Self = Self { must_be_on: 0, may_be_on: 0, is_off: ALL_GATES };
 
-    /// With this many compare steps in a half, and at most so many in a pause of a gate that must be seen on.
+    /// The states for this many compare steps in a half, and at most so many in a pause of a gate that must be seen on.
     fn of(period: &PlayedPeriod, half: u32, longest_pause: u32) -> Self {
         let mut expected = Self { must_be_on: ALL_GATES, may_be_on: ALL_GATES, is_off: ALL_GATES };
-        // Most gates are both on and off for long: one comparison tells.
+        // Most gates are both on and off for long: one comparison is enough.
         let ordinary = longest_pause.saturating_sub(1);
         let mut bit = 1;
         for gate in &period.gates {
@@ -308,7 +308,7 @@ mod tests {
     use crate::nine_switch::GateTicks as Pause;
     use crate::time::Clock;
 
-    /// Of pauses at each border: what must be on, what may be on, what is off.
+    /// Pauses at each limit: which gates must be on, may be on, are off.
     #[test]
     fn what_a_gate_must_show_goes_by_the_length_of_its_pause() {
         let (half, longest) = (1_000, 900);
@@ -322,7 +322,7 @@ mod tests {
         }
     }
 
-    /// A gate that is not as it should be in either period, seen on or off, is told once.
+    /// A gate that is not as it should be in either period, seen on or off, is reported once.
     #[test]
     fn a_gate_that_shows_what_it_should_not_is_told() {
         let on = Expected { must_be_on: 1, may_be_on: 1, is_off: 0 };

@@ -1,4 +1,4 @@
-//! The modulator's work, as the control law is told of it.
+//! The modulator's work, as it is told to the control law.
 
 use super::Settings;
 use super::pulses::{Half, MOST_PLANNED, Pulses};
@@ -12,10 +12,10 @@ use crate::modulation::{
 };
 use crate::time::{Clock, Instant};
 
-/// Share of a mode's largest fundamental that the operating point may use where the voltage must also regulate.
+/// Share of a mode's largest fundamental that the operating point may use if the voltage must also regulate.
 const REGULATION_ROOM: f32 = 0.999;
 
-/// The voltage at the instant of a control interrupt, with what it is made for.
+/// The voltage at the instant of a control interrupt, with the quantities that it is made for.
 pub(super) struct Steady {
     /// Electrical angular speed, in rad/s.
     pub omega: f32,
@@ -25,8 +25,8 @@ pub(super) struct Steady {
     pub voltage_v: f32,
 }
 
-/// The volt-seconds of the halves that ended since the boundary that was `used` last, until the newest one, and their time, on a link of this voltage and of
-/// currents that are so many ticks late.
+/// The volt-seconds of the halves that ended from the last boundary that was `used` until the newest one, and their duration, for a link of this
+/// voltage and currents that are late by this many ticks.
 #[inline(always)]
 pub(super) fn passed(
     pulses: &Pulses,
@@ -47,7 +47,7 @@ pub(super) fn passed(
         volt_ticks = volt_ticks + ended.volt_ticks;
         if pulses.before(boundaries).at == used {
             if late != 0 {
-                // Seen so late: since as long before the beginning, and until as long before the end.
+                // The currents are late: from as long before the beginning until as long before the end.
                 let [earlier, last] =
                     [boundaries + 2, 2].map(|half| pulses.before(half).last_volt_ticks(late));
                 volt_ticks = volt_ticks + earlier - last;
@@ -70,10 +70,10 @@ pub(super) const fn follows(mode: Mode) -> Regulated {
     }
 }
 
-/// Before the first operating point.
+/// The limits before the first operating point.
 pub(super) const NO_LIMITS: ModeLimits = ModeLimits { ripple_share: 1.0, ..ModeLimits::carrier(0.0) };
 
-/// The limits that a decided mode sets to control at a speed, for the last operating point's modulation index, so long after it, in s.
+/// The limits that a decided mode sets to control at a speed, for the modulation index of the last operating point, made so long ago, in s.
 pub(super) fn limits(
     decision: &Decision,
     (omega, modulation_index): (f32, f32),
@@ -86,10 +86,10 @@ pub(super) fn limits(
     let follows = follows(mode);
     let rate = clock.angle_rate(omega);
     let largest = index_limit(mode, rate, devices);
-    // Edges can move at an optimised pattern's largest index, too.
+    // With an optimised pattern, edges can move at its largest index, too.
     let is_all = !matches!(follows, Regulated::Mean | Regulated::Fundamental);
     let largest = if is_all { largest } else { REGULATION_ROOM * largest };
-    // The half that leads to another pattern does so to the point that the torque's trim asks for there.
+    // The half that leads to another pattern leads to the operating point that the torque's trim asks for there.
     let trimmed = if decision.leads() { decision.after } else { mode };
     let (index_limit, filled) =
         exit.fill(mode, [index_floor(rate, devices), largest], modulation_index, passed_s);
@@ -110,17 +110,17 @@ pub(super) fn limits(
     }
 }
 
-/// Samples in a carrier below which they may alias: of a whole number of them each always sees the same of the ripple, or
-/// wanders through it slowly.
+/// Samples per carrier below which they may alias: if their number is whole, each sample always sees the same part of the ripple, or
+/// drifts through it slowly.
 const FEW_SAMPLES: u32 = 11;
 
-/// `true` for a triangular carrier so fast that the samples' mean torque may not be the carrier's.
+/// `true` for a triangular carrier so fast that the mean torque of the samples may differ from the carrier's.
 const fn aliases(mode: Mode, settings: &Settings) -> bool {
     let Settings { devices, clock, .. } = settings;
     mode.is_carrier() && 2 * devices.shortest_half_ticks < FEW_SAMPLES * clock.control_ticks
 }
 
-/// The change of the link that is expected after the sample of a command, in V.
+/// The change of the link voltage that is expected after the sample of a command, in V.
 #[derive(Clone, Copy)]
 pub(super) struct Ahead {
     /// In the middle of the halves that are committed.
@@ -130,7 +130,7 @@ pub(super) struct Ahead {
 }
 
 impl Ahead {
-    /// A link that stands still.
+    /// A link whose voltage stays constant.
     pub const NONE: Self = Self { committed_v: 0.0, next_v: 0.0 };
 }
 
@@ -138,16 +138,17 @@ impl Ahead {
 pub(super) struct Wanted {
     /// Mode of the half where it begins to act.
     pub mode: Mode,
-    /// `true` if it is for the half that is already committed: only the running one stands.
+    /// `true` if it is for the half that is already committed, so that only the running half is fixed.
     pub revises: bool,
-    /// Mean link voltage until then, in V.
+    /// Mean link voltage until that half, in V.
     pub udc_v: f32,
-    /// Expected time for which it acts, in s.
+    /// Expected time for which the command acts, in s.
     pub interval_s: f32,
 }
 
-/// Expected time for which a command of a mode acts, in s: that of the half that its boundary begins, and of those whose boundaries come while nothing newer is
-/// valid, `used_ticks` after the first. Halves are not whole parts of a control period: of 0.83 of one, a command makes one or two.
+/// Expected time for which a command of a mode acts, in s: that of the half that begins at its boundary, and of those whose boundaries come before a
+/// newer command is valid, `used_ticks` after the first. Control periods are not whole multiples of halves: with halves of 0.83 of a period, a
+/// command makes one or two.
 #[inline(always)]
 pub(super) fn interval_s(mode: Mode, omega: f32, used_ticks: i32, settings: &Settings) -> f32 {
     let Settings { clock, devices, .. } = settings;
@@ -156,11 +157,11 @@ pub(super) fn interval_s(mode: Mode, omega: f32, used_ticks: i32, settings: &Set
         0 => shortest_s,
         carriers => core::f32::consts::PI / (carriers as f32 * omega.abs()),
     };
-    // That time is a control period at most.
+    // The time without a newer command is a control period at most.
     if half_s >= clock.control_s {
         return half_s;
     }
-    // A boundary at its end has the newer one already.
+    // A boundary at the end of that time already uses the newer command.
     let more = clock.seconds(used_ticks - 1) / half_s;
     half_s * (1.0 + (more as u32) as f32)
 }
@@ -180,7 +181,7 @@ pub(super) fn committed(
     };
     let running = pulses.before(1);
     let elapsed = now.since(newest.at).max(0) as u32;
-    // Of currents from before the newest boundary.
+    // For currents from before the newest boundary.
     let before = newest.at.since(now).max(0) as u32;
     let rest = || {
         let rest = running.volt_ticks_from(elapsed);
@@ -203,8 +204,8 @@ pub(super) fn committed(
 }
 
 impl Half {
-    /// Ripple flux at the end of this half, which is committed, where one of the mode `decided` begins: what an old pattern leaves to a carrier, and that of a
-    /// pattern that begins there.
+    /// Ripple flux at the end of this half, which is committed and followed by one of the mode `decided`: what an old pattern leaves to a carrier, or
+    /// that of a pattern that begins there.
     fn ripple_wb(&self, decided: Mode, steady: &Steady) -> Option<AlphaBeta> {
         let (mode, end) = (self.half.mode, u32::from(self.half.half) + 1);
         if decided.has_path() {
@@ -213,14 +214,14 @@ impl Half {
         mode.has_path().then(|| self.ripple_at(mode, end, steady))
     }
 
-    /// A mode's ripple where half number `half` begins, seen in the mirror if the half is: nothing under a carrier.
+    /// A mode's ripple at the beginning of half number `half`, mirrored if the half is; none under a carrier.
     fn ripple_at(&self, mode: Mode, half: u32, steady: &Steady) -> AlphaBeta {
         let ripple = ripple_at(mode, half, steady.voltage_v, steady.udc_v, steady.omega.abs());
         AlphaBeta { beta: if self.mirrored { -ripple.beta } else { ripple.beta }, ..ripple }
     }
 }
 
-/// The number of half `half` of a mode in the mode that follows.
+/// The number that half `half` of a mode has in the mode that follows.
 fn number(from: Mode, to: Mode, half: u32) -> u32 {
     if from == to || from == Mode::Async && to.is_optimal() {
         half
@@ -254,7 +255,7 @@ mod tests {
         );
     }
 
-    /// A command acts for each half whose boundary comes before the next command is valid; at that instant the next one acts already.
+    /// A command acts for each half whose boundary comes before the next command is valid; at that instant the next one already acts.
     #[test]
     fn a_command_acts_for_the_halves_that_use_it() {
         let clock = Clock::new(25_000_000, 2_500);
@@ -281,7 +282,7 @@ mod tests {
         }
     }
 
-    /// A pattern's ripple of a machine that turns backward is that of one that turns forward, upside down.
+    /// A pattern's ripple in a machine that turns backward is the mirrored ripple of one that turns forward.
     #[test]
     fn a_ripple_in_the_mirror_is_upside_down() {
         let steady = Steady { omega: 900.0, udc_v: 1_500.0, voltage_v: 800.0 };

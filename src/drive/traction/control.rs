@@ -29,8 +29,8 @@ use start_up::Starting;
 
 type Input<'a> = PeriodInput<'a, Traction>;
 
-/// A period as its checks leave it: its nominal instant, the measurements with the angle where they were taken, the electrical speed in rad/s, and the
-/// mode of the newest half that was loaded.
+/// A period after its checks: its nominal instant, the measurements with the angle at their instant, the electrical speed in rad/s, and the mode of
+/// the newest half that was loaded.
 struct Seen {
     now: Instant,
     measured: Measurements,
@@ -38,8 +38,8 @@ struct Seen {
     loaded: Mode,
 }
 
-/// The control interrupt's task, for a machine and a control law. In this order in memory, the remembered halves last: within 1,020 bytes of its
-/// beginning a number is loaded by one instruction, beyond by two.
+/// The control interrupt's task, for a machine and a control law. The order in memory is deliberate, with the remembered halves last: a number within
+/// 1,020 bytes of the beginning is loaded by one instruction, one beyond by two.
 #[repr(C)]
 pub struct ControlTask<M = &'static Tables, L = Controller> {
     machine: M,
@@ -49,42 +49,42 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     unexplained: UnexplainedWatch,
     /// Nominal instant of the next call.
     now: Instant,
-    /// Instant of the newest carrier boundary that was used.
+    /// Instant of the newest carrier boundary that has been used.
     boundary: Option<Instant>,
-    /// The boundary that the operating point was made for, `None` where none holds, and what the mode decided there allows.
+    /// The boundary that the operating point was made for, `None` if none holds, and the limits of the mode decided there.
     aimed: Option<Decision>,
     limits: ModeLimits,
     /// The fundamental of the last command's operating point, in V.
     steady_v: f32,
-    /// Fundamental that the last operating point would have without a limit and without the trim, as a share of six-step.
+    /// Fundamental that the last operating point would have without limit and trim, as a share of six-step.
     modulation_index: f32,
     exit: SixStepExit,
-    /// The link's voltage over what its sensor reads, as far as it is known.
+    /// The link's voltage divided by its sensor's reading, as far as it is known.
     link_scale: f32,
     damper: LinkDamper,
     /// The link's ripple, the instant of its last sample, and the change that is expected of the link (see [`Ahead`]).
     ripple: LinkRipple,
     link_seen: Instant,
     ahead: Ahead,
-    /// The last demand, in N·m, and whether it has jumped and no half has been revised for it yet.
+    /// The last demand, in N·m, and whether it has jumped without a half having been revised for it yet.
     demand_nm: f32,
     jumped: bool,
     /// The newest command, and whether it is for the half that is already committed.
     reference: Reference,
     revises: bool,
-    /// Mode that it was made for.
+    /// Mode that the command was made for.
     mode: Mode,
     masked: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
-    /// `true` once the operator was asked for a command: who is not asked is not told.
+    /// `true` once the operator was asked for a command; an operator who is not asked gets no reports.
     operated: bool,
     slots: SlotTimer,
-    /// Electrical speed at which the angle was lost, in rad/s, until that is acknowledged.
+    /// Electrical speed at which the angle was lost, in rad/s, until the loss is acknowledged.
     lost_at: Option<f32>,
-    /// The search for the angle of a sensor that only counts.
+    /// The search for the angle with a sensor that only counts.
     starting: Starting,
-    /// The known errors of the position sensor; and by how much the angle was off what the speed made of the one before, in rad.
+    /// The known errors of the position sensor, and the deviation of the angle from the one extrapolated from the last by the speed, in rad.
     harmonics: AngleHarmonics,
     innovation_rad: f32,
     zeros: CurrentZeros,
@@ -102,7 +102,7 @@ impl<M: Machine> ControlTask<M> {
 }
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
-    /// The same with another control law, at rest.
+    /// The same task with another control law, at rest.
     pub const fn with_law(machine: M, settings: Settings, first: Instant, controller: L) -> Self {
         Self {
             machine,
@@ -146,32 +146,32 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
-    /// The same without a check.
+    /// The same task without a check.
     pub const fn without(mut self, masked: MaskedFaults) -> Self {
         self.masked = masked;
         self
     }
 
-    /// The same with a schedule of one's own.
+    /// The same task with another schedule.
     pub const fn scheduled(mut self, schedule: Schedule) -> Self {
         self.pulses = Pulses::new(&self.settings, schedule);
         self
     }
 
-    /// Another schedule, before the first call.
+    /// Sets another schedule, before the first call.
     #[cold]
     #[inline(never)]
     pub fn set_schedule(&mut self, schedule: Schedule) {
         self.pulses = Pulses::new(&self.settings, schedule);
     }
 
-    /// Other settings than those it was built with, and the usual schedule, before the first call, which is at `first`.
+    /// Sets other settings than those it was built with, and the usual schedule, before the first call, which is at `first`.
     pub fn set_up(&mut self, settings: Settings, first: Instant) {
         (self.settings, self.now) = (settings, first);
         self.set_schedule(Schedule::new(&settings.clock));
     }
 
-    /// Another control law of the same kind, at rest, before the first call.
+    /// Sets another control law of the same kind, at rest, before the first call.
     pub fn set_law(&mut self, controller: L) {
         self.controller = controller;
     }
@@ -181,7 +181,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         &mut self.controller
     }
 
-    /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed one is a fault.
+    /// The control timer's interrupt. Deadline: one control period after its nominal instant; a missed deadline is a fault.
     pub fn run(&mut self, port: &mut impl ControlPort, shared: &Shared) {
         let now = self.begin(port, shared);
         let sample = port.sample(now);
@@ -213,12 +213,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         now
     }
 
-    /// Every check of what is measured, and of what the PWM interrupt tells.
+    /// Every check of the measurements and of what the PWM interrupt reports.
     #[inline(always)]
     fn protect(&mut self, now: Instant, input: Input, port: &mut impl ControlPort, shared: &Shared) -> Seen {
         let Input { sample, command } = input;
         let mut measured = sample.measured();
-        // Limits hold for what the sensors show: gains that are learnt would hide a sensor that fails.
+        // Limits apply to the sensors' readings: learnt gains would hide a failing sensor.
         measured.currents_a = self.zeros.without(sample.currents_a);
         let told = self.pulses.look(&shared.loaded, now, self.now);
         let released = told.map(|told| told.released);
@@ -229,7 +229,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.trip = shared.trip.read();
         }
         if let Some(fault) = sample.hardware {
-            // That the gates are held is only what comes of it.
+            // Held gates are only a consequence of this fault.
             self.trip = self.trip.filter(|trip| trip.fault != Fault::GatesHeld);
             self.check(Some((fault, 1.0, 0.0)), sample, port);
         }
@@ -238,7 +238,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let (omega, lost) = self.track(angle, command.enable, port);
         let coarse = self.settings.counts_coarsely();
         let here = if coarse { self.controller.tracker().angle() } else { angle.unwrap_or(Angle::ZERO) };
-        // That of the currents.
+        // The angle at the instant of the currents.
         let ahead_s = self.settings.angle_late_s - self.delay.s;
         measured.angle = here + Angle::within_half_turn(self.controller.omega() * ahead_s);
         let overdue = self.pulses.newest().and_then(|newest| newest.overdue(now, &self.settings.clock));
@@ -250,7 +250,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         Seen { now, measured, omega, loaded: told.map_or(Mode::Off, |told| told.mode) }
     }
 
-    /// The control law, or what begins it anew; `true` if there are to be pulses.
+    /// The control law, or its restart; `true` if there are to be pulses.
     #[inline(always)]
     fn decide(&mut self, seen: &Seen, input: Input, port: &mut impl ControlPort, shared: &Shared) -> bool {
         let Input { sample, command } = input;
@@ -274,7 +274,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             true
         } else {
             self.rest(now, omega, measured);
-            // Who blocks the gates without an operator has them back when he likes.
+            // Without an operator, whoever blocked the gates may release them at any time.
             if self.operated || self.trip.is_some() {
                 self.stay_safe(sample, omega, port);
             }
@@ -287,13 +287,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.rest_currents(sample, pulses);
             pulses
         };
-        // Not finite if either is not.
+        // The sum is not finite if either term is not.
         let odd = self.reference.voltage_v + omega;
         self.check((!odd.is_finite()).then_some((Fault::NotFinite, odd, f32::MAX)), sample, port);
         pulsing && self.trip.is_none()
     }
 
-    /// The halves that the PWM interrupt will play, and whether they came in time; `true` if they are pulses.
+    /// The halves that the PWM interrupt will play, with the check that they came in time; `true` if they are pulses.
     #[inline(always)]
     fn plan(
         &mut self,
@@ -314,12 +314,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let late_s = self.settings.clock.seconds(late as i32);
         self.check((late > 0).then_some((Fault::ControlDeadline, late_s, 0.0)), sample, port);
         let pulsing = pulsing && self.trip.is_none();
-        // Not after a fault.
+        // No revision after a fault.
         self.revises &= pulsing;
         pulsing
     }
 
-    /// The period as the flight recorder, the operator and whoever watches see it.
+    /// The period as the flight recorder, the operator and any observer see it.
     #[inline(always)]
     fn tell(
         &mut self,

@@ -1,18 +1,18 @@
 //! The known filter of the current sensors, as a delay.
 //!
-//! A filter of the first order with the time constant τ shows a current that turns with ω late by `atan(ωτ)/ω` and too small by `√(1 + (ωτ)²)`. Of what changes
-//! slowly within τ it shows what flowed τ ago. So its currents are taken for those of an earlier instant: with the angle of then, and all volt-seconds counted
-//! from then on.
+//! A first-order filter with the time constant τ shows a current that turns with ω late by `atan(ωτ)/ω` and too small by `√(1 + (ωτ)²)`. A current
+//! that changes slowly within τ is shown as it was τ ago. So the currents are treated as those of an earlier instant: they are taken with the angle
+//! of that instant, and all volt-seconds are counted from it.
 
 use crate::time::Clock;
 
-/// The delay of a filter at a speed.
+/// The delay of a filter at a given speed.
 #[derive(Clone, Copy)]
 pub(super) struct CurrentDelay {
     /// The delay, in ticks, and in s.
     pub ticks: u32,
     pub s: f32,
-    /// A current over what is shown of it.
+    /// Ratio of a current to its reading.
     pub scale: f32,
 }
 
@@ -20,7 +20,7 @@ impl CurrentDelay {
     /// No filter.
     pub const NONE: Self = Self { ticks: 0, s: 0.0, scale: 1.0 };
 
-    /// Of a filter's time constant, in ticks, at an electrical speed, in rad/s; both within 0.2 % for ωτ up to 0.3.
+    /// The delay for a filter's time constant, in ticks, at an electrical speed, in rad/s; both values within 0.2 % for ωτ up to 0.3.
     pub fn of(filter_ticks: u32, omega: f32, clock: &Clock) -> Self {
         if filter_ticks == 0 {
             return Self::NONE;

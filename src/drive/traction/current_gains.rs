@@ -1,42 +1,42 @@
-//! The differences between the gains of the three current sensors, learnt from the sum of what they show.
+//! The differences between the gains of the three current sensors, learnt from the sum of their readings.
 //!
-//! The three currents of a machine without a neutral wire add up to nothing. Sensors that show (1 + g) times theirs add up to Σ g i, which is
-//! 3/2 times the product of the current's vector and that of the gains: what is common to all three has no part in it, and cannot be told from it. The vector of the gains follows
-//! the sum by normalised least mean squares, `g += μ Σ i/(|i|² + i₀²)`: an error goes with a time constant of some 15 ms, and of longer ones where the current is
-//! below i₀. The sensors' offsets have to be taken off before.
+//! The three currents of a machine without a neutral wire add up to zero. Sensors that show (1 + g) times their current add up to Σ g i, which is 3/2
+//! times the product of the current's vector and that of the gains; a gain common to all three does not contribute and cannot be found from it. The
+//! vector of the gains follows the sum by normalised least mean squares, `g += μ Σ i/(|i|² + i₀²)`: an error decays with a time constant of some 15
+//! ms, and more slowly if the current is below i₀. The sensors' offsets must have been subtracted before.
 
 use crate::frames::{Abc, AlphaBeta, limit_magnitude};
 
-/// μ: two thirds of the share of a sum that a control period takes out.
+/// μ: two thirds of the share of a sum that one control period removes.
 const RATE: f32 = 0.02;
 /// Current i₀ below which the sum tells little, as a share of the largest.
 const FROM: f32 = 0.2;
-/// Largest length of the vector along either axis, and what is left alone, which a converter's steps may look like.
+/// Largest component of the vector along either axis, and the size that is ignored, since a converter's steps may look like it.
 const MOST: f32 = 0.05;
 const LEFT_ALONE: f32 = 0.001;
 
-/// The gains' vector, and what it makes of the currents.
+/// The gains' vector, and the resulting scales of the currents.
 pub(super) struct CurrentGains {
     gains: AlphaBeta,
-    /// A current over what its sensor shows.
+    /// Ratio of each current to its sensor's reading.
     scales: Abc,
 }
 
 impl CurrentGains {
-    /// All three alike.
+    /// All three gains alike.
     pub const fn new() -> Self {
         Self { gains: AlphaBeta { alpha: 0.0, beta: 0.0 }, scales: Abc { a: 1.0, b: 1.0, c: 1.0 } }
     }
 
-    /// The currents that flow where sensors without offsets show these, in A.
+    /// The currents that flow when sensors without offsets show these, in A.
     #[inline(always)]
     pub fn without(&self, shown: Abc) -> Abc {
         let Abc { a, b, c } = self.scales;
         Abc { a: shown.a * a, b: shown.b * b, c: shown.c * c }
     }
 
-    /// A control period with these currents, in A, as far as the gains are known, in a machine of this largest current, in A, each over what
-    /// is shown of it by this, too.
+    /// Learns in a control period from these currents, in A, corrected by the gains known so far, in a machine of this largest current, in A.
+    /// The last argument is a ratio of current to reading that all three share; the scales include it.
     #[inline(never)]
     pub fn learn(&mut self, currents_a: Abc, largest_a: f32, over_shown: f32) {
         let (current, from_a) = (currents_a.clarke(), FROM * largest_a);
@@ -60,8 +60,8 @@ mod tests {
 
     const LARGEST_A: f32 = 200.0;
 
-    /// The largest difference of two currents' scales after so many control periods with a current, in A, that turns once in 100 of them,
-    /// seen by sensors of these gains and an offset in A in the first.
+    /// The largest difference of two currents' scales after this many control periods with a current, in A, that turns once in 100 of them, seen by
+    /// sensors of these gains and, in the first, an offset in A.
     fn left(periods: u32, current_a: f32, gains: [f32; 3], offset_a: f32) -> f32 {
         let mut learnt = CurrentGains::new();
         let show = |period: u32| {

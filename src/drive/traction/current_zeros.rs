@@ -1,46 +1,46 @@
-//! The zeros of the current sensors, learnt while no current can flow, and taken off what they show.
+//! The zeros of the current sensors, learnt while no current can flow, and subtracted from the readings.
 //!
-//! With the gates off, and turning too slowly for its diodes to rectify, a machine has no current: what the sensors show then is their offset.
-//! It is the mean over all of such a rest, and is taken over when pulses begin; so drift is followed from one rest to the next, and under
-//! pulses, where a current is not known to be nothing, none is.
+//! With the gates off, and at speeds too low for its diodes to rectify, a machine has no current: the sensors then show their offset. The offset is
+//! the mean over the whole rest and is adopted when pulses begin. So drift is followed from one rest to the next, but not under pulses, when no
+//! current is known to be zero.
 
 use crate::frames::Abc;
 use crate::protection::{FailedCheck, Fault};
 
-/// Control periods without pulses until no current is left that flowed under them.
+/// Control periods without pulses until the current that flowed under pulses is gone.
 const SETTLING: u32 = 50;
-/// Control periods that a mean is of at least; and those that it forgets by, at most.
+/// Fewest control periods in a mean, and the most by which it forgets.
 const LEAST: u32 = 100;
 const MOST: u32 = 5_000;
-/// Offset that is left alone, as a share of the largest current: what a converter's step or the snubbers' current may look like.
+/// Offset that is ignored, as a share of the largest current: a converter's step or the snubbers' current may look like it.
 const LEFT_ALONE_SHARE: f32 = 0.001;
 /// Offset that is a fault, as a share of the largest current.
 const FAULT_SHARE: f32 = 0.05;
 
-/// The zeros, in A, and the mean of the rest that goes on.
+/// The zeros, in A, and the mean of the present rest.
 pub(super) struct CurrentZeros {
     zeros: Abc,
     mean: Abc,
     periods: u32,
-    /// The offset of the last rest where it was too large, in A; 0 otherwise.
+    /// The offset of the last rest if it was too large, in A; 0 otherwise.
     refused_a: f32,
 }
 
 impl CurrentZeros {
-    /// As the board has them.
+    /// The zeros as the board has them.
     pub const fn new() -> Self {
         const NONE: Abc = Abc { a: 0.0, b: 0.0, c: 0.0 };
         Self { zeros: NONE, mean: NONE, periods: 0, refused_a: 0.0 }
     }
 
-    /// The currents that flow where sensors show these, in A.
+    /// The currents that flow when the sensors show these, in A.
     #[inline(always)]
     pub fn without(&self, shown: Abc) -> Abc {
         let Abc { a, b, c } = self.zeros;
         Abc { a: shown.a - a, b: shown.b - b, c: shown.c - c }
     }
 
-    /// A control period in which no current flows, and what the sensors show, in A.
+    /// A control period in which no current flows, with the sensors' readings, in A.
     pub fn rest(&mut self, shown: Abc) {
         self.periods = self.periods.saturating_add(1);
         let of = self.periods.saturating_sub(SETTLING);
@@ -58,7 +58,7 @@ impl CurrentZeros {
         self.periods = 0;
     }
 
-    /// Pulses begin, or go on, in a machine of this largest current, in A. An offset that is too large is a fault, until a later rest shows none.
+    /// Pulses begin or go on, in a machine of this largest current, in A. Too large an offset is a fault until a later rest shows none.
     #[inline(always)]
     pub fn begin(&mut self, largest_a: f32) -> Option<FailedCheck> {
         if self.periods == 0 && self.refused_a == 0.0 { None } else { self.take_over(largest_a) }

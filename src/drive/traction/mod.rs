@@ -1,11 +1,11 @@
 //! The PMaSynRM drive: one control task, one PWM task, two cells.
 //!
-//! Control decides which voltage; for the boundaries of the period after it its task calls the modulator, which decides which pulses. The PWM task
-//! loads each boundary's half, which is there, or it is a fault.
+//! Control decides which voltage to apply; for the boundaries of the following period its task calls the modulator, which decides which pulses. The
+//! PWM task loads each boundary's half; if the half is missing, that is a fault.
 //!
-//! Logical execution time: a command sampled at one control instant may be used from the next one on, and each task
-//! looks at the other's words by their instants, not by their arrival. So where one interrupt lands in the other
-//! changes nothing, and the same inputs give the same pulses on every board and on the host.
+//! Logical execution time: a command sampled at one control instant may be used from the next one on, and each task selects the other's words by
+//! their instants, not by their arrival. So it makes no difference at which point one interrupt interrupts the other, and the same inputs give the
+//! same pulses on every board and on the host.
 
 mod applied;
 mod control;
@@ -42,26 +42,26 @@ pub struct Settings {
     pub devices: SwitchLimits,
     /// The current loop's gains.
     pub gains: Gains,
-    /// Age of the angle when it is sampled, in s; negative where it is read after the currents.
+    /// Age of the angle when it is sampled, in s; negative if it is read after the currents.
     pub angle_late_s: f32,
-    /// Step of a count of the angle, electrical, in rad; 0: it has none to speak of.
+    /// Step of one count of the angle, electrical, in rad; 0: negligible.
     pub angle_step_rad: f32,
     /// Time constant of the current sensors' filter, in ticks, up to the shortest carrier half.
     pub current_filter_ticks: u32,
     /// The devices' drops.
     pub drops: Drops,
-    /// The share of the machine's iron loss that is made up for, 0 ..= 1: [`Ratings::iron_share`](crate::machine::Ratings::iron_share), unless the
-    /// drive is told another.
+    /// The share of the machine's iron loss that is compensated, 0 ..= 1: [`Ratings::iron_share`](crate::machine::Ratings::iron_share), unless the
+    /// drive is given another.
     pub iron_share: f32,
 }
 
-/// Drops, which a current through a leg loses of the link's voltage: means of IGBT and diode.
+/// Voltage drops that the current through a leg takes from the link's voltage: means of IGBT and diode.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drops {
-    /// Whatever the current is, in V; 0: nothing is made up for.
+    /// Constant part, whatever the current is, in V; 0: no compensation.
     pub threshold_v: f32,
-    /// For each ampere, in ohm.
+    /// Part per ampere, in ohm.
     pub slope_ohm: f32,
 }
 
@@ -74,7 +74,7 @@ impl Drops {
     }
 }
 
-/// Step of a count from which the tracker's angle is nearer the rotor's than the sensor's own, in rad: half a degree.
+/// Step of a count from which on the tracker's angle is nearer to the rotor's than the sensor's own, in rad: half a degree.
 const COARSE_RAD: f32 = 8.727e-3;
 
 impl Settings {
@@ -92,12 +92,12 @@ impl Settings {
         }
     }
 
-    /// Step of a count, electrical, in rad, of an encoder with this many counts in a turn of the shaft, at least 1.
+    /// Step of a count, electrical, in rad, of an encoder with this many counts per shaft turn, at least 1.
     pub const fn step_rad(counts: u32, pole_pairs: f32) -> f32 {
         core::f32::consts::TAU * pole_pairs / counts as f32
     }
 
-    /// `true` if the angle is counted so coarsely that the speed tracker's own is used: between two counts it turns on by the speed.
+    /// `true` if the counts are so coarse that the speed tracker's angle is used, which the speed moves on between two counts.
     #[inline(always)]
     fn counts_coarsely(&self) -> bool {
         self.angle_step_rad > COARSE_RAD
@@ -108,11 +108,11 @@ impl Settings {
 pub struct Shared<'a> {
     /// The halves that control has planned.
     pub planned: Planned,
-    /// The boundaries at which the PWM interrupt has loaded one, and its samples there.
+    /// The boundaries at which the PWM interrupt has loaded a half, and its samples there.
     pub loaded: History<LOADED_WORDS>,
     /// The fault that tripped the PWM interrupt.
     pub trip: Seqlock<Trip, 4>,
-    /// Instant of the newest control interrupt, from its beginning on.
+    /// Instant of the newest control interrupt, from the beginning of that interrupt on.
     pub began: AtomicU32,
     /// Between the operator in the idle loop and control.
     pub operator: OperatorMailboxes,

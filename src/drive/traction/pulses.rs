@@ -1,4 +1,4 @@
-//! The pulses: the modulator's steps, made at control's priority for the boundaries where they will be loaded, and what has become of them.
+//! The pulses: the modulator's steps, made at control's priority for the boundaries at which they will be loaded, and their outcome.
 
 use super::Settings;
 use crate::cell::{History, Mailbox, Place};
@@ -8,20 +8,20 @@ use crate::modulation::{CarrierHalf, Mode, Modulator, Reference, Schedule};
 use crate::protection::{FailedCheck, Fault};
 use crate::time::{Clock, Instant};
 
-/// By which part of a control period the PWM interrupt may be late before control calls it lost: more than it takes to enter it.
+/// Part of a control period by which the PWM interrupt may be late before control considers it lost: more than it takes to enter it.
 const PWM_LATE_PART: u32 = 4;
 
-/// Records of which one is that of the newest boundary at a control interrupt's instant: two may have come since.
+/// Newest records, one of which belongs to the newest boundary at a control interrupt's instant: two may have come since.
 const LATEST: u32 = 3;
 
-/// Halves that a control period may plan: a locked carrier of a machine that switches once a control period has five, and one more if it is
-/// turned on; of the optimised patterns' short halves eleven.
+/// Halves that a control period may plan: five for a locked carrier of a machine that switches once a control period, and one more if it is turned
+/// on; eleven of the optimised patterns' short halves.
 pub(super) const MOST_PLANNED: u32 = if cfg!(feature = "optimal") { 12 } else { 6 };
 
-/// Halves that the cell to the PWM interrupt holds: those for a period's boundaries, and those that are planned meanwhile for the next one's.
+/// Halves that the cell to the PWM interrupt holds: those for a period's boundaries, and those planned meanwhile for the next period's.
 pub const PLANNED_SLOTS: usize = if cfg!(feature = "optimal") { 32 } else { 16 };
 
-/// Halves that are remembered: those of a period that ended, three that run or are loaded, and those that are planned ahead.
+/// Halves that are remembered: those of a period that ended, three that are running or loaded, and those planned ahead.
 const REMEMBERED: usize = PLANNED_SLOTS;
 const _: () = assert!(2 * MOST_PLANNED as usize + 3 <= REMEMBERED);
 
@@ -31,12 +31,12 @@ pub type Planned = Mailbox<PlannedHalf, PLANNED_WORDS, PLANNED_SLOTS>;
 /// A half that is planned or loaded.
 #[derive(Clone, Copy)]
 pub(super) struct Half {
-    /// The boundary where it is loaded.
+    /// The boundary at which it is loaded.
     pub at: Instant,
-    /// The next one, where it begins.
+    /// The next boundary, at which it begins.
     pub begins: Instant,
     pub half: CarrierHalf,
-    /// `true` if the modulator saw the machine in the mirror (turning backward).
+    /// `true` if the modulator saw the machine mirrored (turning backward).
     pub mirrored: bool,
     /// The volt-ticks of the whole half, in ticks; see [`volt_ticks`].
     pub volt_ticks: AlphaBeta,
@@ -64,25 +64,25 @@ impl Half {
         Self { at, begins, half: CarrierHalf::off(period_ticks), ..Self::NONE }
     }
 
-    /// `true` if the gates are off in it.
+    /// `true` if the gates are off in this half.
     #[inline]
     pub fn is_off(&self) -> bool {
         self.half.mode == Mode::Off
     }
 
-    /// The volt-ticks from `elapsed` ticks after its beginning on, in ticks.
+    /// The volt-ticks of the rest of the half, from `elapsed` ticks after its beginning, in ticks.
     #[inline]
     pub fn volt_ticks_from(&self, elapsed: u32) -> AlphaBeta {
         volt_ticks(self.half.on_ticks(elapsed))
     }
 
-    /// The volt-ticks of its last ticks, all of it at most, in ticks.
+    /// The volt-ticks of the last ticks of the half, at most all of it, in ticks.
     #[inline]
     pub fn last_volt_ticks(&self, last: u32) -> AlphaBeta {
         self.volt_ticks_from(self.half.period_ticks.saturating_sub(last))
     }
 
-    /// The PWM interrupt that should have come by `now`, where the half begins, and has not: since when, in s.
+    /// The failed check of a PWM interrupt that should have come by `now`, since the half begins there, and has not; with its delay, in s.
     #[inline]
     pub fn overdue(&self, now: Instant, clock: &Clock) -> Option<FailedCheck> {
         let late = now.since(self.begins);
@@ -96,18 +96,18 @@ impl Half {
     }
 }
 
-/// The PWM interrupt's word of itself at the newest boundary.
+/// The PWM interrupt's report of itself at the newest boundary.
 #[derive(Clone, Copy)]
 pub(super) struct PwmStatus {
     /// `true` once it has found a fault.
     pub tripped: bool,
     /// Number of the release that it had carried out.
     pub released: u8,
-    /// Mode of the half that runs from there on.
+    /// Mode of the half that runs from that boundary on.
     pub mode: Mode,
 }
 
-/// The order that the halves of a control period are made by.
+/// The order by which the halves of a control period are made.
 pub(super) struct Order<'a> {
     /// Pulses, or none.
     pub pulses: bool,
@@ -116,16 +116,16 @@ pub(super) struct Order<'a> {
     pub release: u8,
 }
 
-/// The modulator, and the halves that it has made. In this order in memory, as in [`ControlTask`](super::ControlTask).
+/// The modulator, and the halves that it has made. The order in memory is as in [`ControlTask`](super::ControlTask).
 #[repr(C)]
 pub(super) struct Pulses {
     modulator: Modulator,
     /// Length of a half without pulses, in ticks.
     off_ticks: u32,
-    /// Number of the half that was planned last, and the boundary after its own, for which nothing is planned yet.
+    /// Number of the half planned last, and the boundary after its own, for which nothing is planned yet.
     planned: u32,
     unplanned: Instant,
-    /// Number of the half that was loaded at the newest boundary, and what the PWM interrupt told there; `None` before it has come.
+    /// Number of the half loaded at the newest boundary, and the PWM interrupt's report there; `None` before that interrupt has come.
     loaded: u32,
     told: Option<(Place, PwmStatus)>,
     /// Half number n is in place `n % REMEMBERED`.
@@ -133,7 +133,7 @@ pub(super) struct Pulses {
 }
 
 impl Pulses {
-    /// Before anything is known of the PWM timer.
+    /// The state before anything is known of the PWM timer.
     pub(super) const fn new(settings: &Settings, schedule: Schedule) -> Self {
         let off_ticks = settings.devices.shortest_half_ticks;
         Self {
@@ -158,7 +158,7 @@ impl Pulses {
         self.told.map(|_| self.half(self.loaded))
     }
 
-    /// The half that was planned last: nothing is planned for the boundary where it begins; `None` before there was a boundary.
+    /// The half planned last (nothing is planned for the boundary at which it begins); `None` before there was a boundary.
     #[inline(always)]
     pub(super) fn last(&self) -> Option<&Half> {
         self.told.map(|_| self.half(self.planned))
@@ -170,7 +170,7 @@ impl Pulses {
         self.planned.wrapping_sub(self.loaded)
     }
 
-    /// Their volt-ticks, in ticks; `None` where the gates are off in one of them.
+    /// The sum of their volt-ticks, in ticks; `None` if the gates are off in one of them.
     #[inline(always)]
     pub(super) fn unloaded_volt_ticks(&self) -> Option<AlphaBeta> {
         let mut sum = AlphaBeta::default();
@@ -190,7 +190,7 @@ impl Pulses {
         loaded + self.unloaded_volt_ticks().unwrap_or_default()
     }
 
-    /// The half that was loaded so many boundaries before the newest one.
+    /// The half that was loaded this many boundaries before the newest one.
     #[inline(always)]
     pub(super) fn before(&self, boundaries: u32) -> &Half {
         self.half(self.loaded.wrapping_sub(boundaries))
@@ -203,8 +203,8 @@ impl Pulses {
         loaded.read(place, |[newest]: [_; 1]| LoadedRecord(newest).currents_a())
     }
 
-    /// Looks at the newest boundary as it stood at `now`, even if the PWM interrupt has come since, as it does twice in a control period where a
-    /// carrier lasts one; `None` before it has come at all. What is planned in this period is for boundaries from `valid` on.
+    /// Looks at the boundary that was newest at `now`, even if the PWM interrupt has come since (it comes twice in a control period if a carrier
+    /// lasts one); `None` before it has come at all. Pulses planned in this period are for boundaries from `valid` on.
     #[inline]
     pub(super) fn look(
         &mut self,
@@ -218,7 +218,7 @@ impl Pulses {
         self.told.map(|(_, told)| told)
     }
 
-    /// The same where a boundary has come.
+    /// The same after a new boundary.
     #[inline(never)]
     fn look_anew(
         &mut self,
@@ -228,7 +228,7 @@ impl Pulses {
     ) -> Option<(Place, PwmStatus)> {
         let place = loaded.find(LATEST, |record| {
             let record = LoadedRecord(record);
-            // A record that was written has a half before its next boundary.
+            // In a record that was written, a half lies between its boundary and the next one.
             record.begins() != record.at() && now.reached(record.at())
         })?;
         let (at, begins, (tripped, released)) = loaded.read(place, |[newest]: [_; 1]| {
@@ -246,7 +246,7 @@ impl Pulses {
         Some((place, PwmStatus { tripped, released, mode: self.before(1).half.mode }))
     }
 
-    /// Takes over from what the PWM interrupt loaded by itself, without pulses: at the boundary `at`, and at those after it that come before
+    /// Continues from the halves without pulses that the PWM interrupt loaded by itself: at the boundary `at`, and at those after it that come before
     /// `valid`.
     #[cold]
     #[inline(never)]
@@ -267,13 +267,13 @@ impl Pulses {
         }
     }
 
-    /// `true` if a boundary that comes before `until` has no half yet, and any boundary is known.
+    /// `true` if a boundary that comes before `until` has no half yet, and at least one boundary is known.
     #[inline(always)]
     pub(super) fn lack(&self, until: Instant) -> bool {
         !self.unplanned.reached(until) && self.told.is_some()
     }
 
-    /// Plans a half for each boundary that comes before `until`; call it where there are such.
+    /// Plans a half for each boundary that comes before `until`; to be called when there are such boundaries.
     #[inline(always)]
     pub(super) fn plan(&mut self, until: Instant, order: &Order, cell: &Planned) {
         for _ in 0..MOST_PLANNED {
@@ -284,13 +284,13 @@ impl Pulses {
         }
     }
 
-    /// Plans one. Out of line: what a loop prepares for all of its rounds would be prepared for one.
+    /// Plans one half. Out of line: otherwise values that a loop prepares for all of its rounds would be prepared for a single one.
     #[inline(never)]
     fn plan_next(&mut self, order: &Order, cell: &Planned) {
         let (at, begins) = (self.unplanned, self.half(self.planned).ends());
         self.planned = self.planned.wrapping_add(1);
         let next = &mut self.halves[self.planned as usize % REMEMBERED];
-        // Field by field: the half goes where it stays.
+        // Field by field: the half is written in place.
         (next.at, next.begins) = (at, begins);
         if order.pulses {
             next.half = self.modulator.step(begins, Some(order.reference));
@@ -303,7 +303,7 @@ impl Pulses {
         tell(next, order, cell);
     }
 
-    /// Makes the half anew that was loaded at the newest boundary, in the control period after the command that wants it.
+    /// Revises the half that was loaded at the newest boundary, in the control period after the command that asks for it.
     #[inline(never)]
     pub(super) fn revise(&mut self, order: &Order, cell: &Planned) {
         let newest = &mut self.halves[self.loaded as usize % REMEMBERED];
@@ -353,7 +353,7 @@ mod tests {
         }
     }
 
-    /// Nobody knows for which boundaries before there was one, and what is planned is not planned again.
+    /// Before the first boundary nobody knows for which boundaries halves are lacking; a half that is planned is not planned again.
     #[test]
     fn halves_are_lacking_from_the_first_boundary_on_until_they_are_planned() {
         let (history, cell) = (History::new(), Planned::new());
@@ -367,7 +367,7 @@ mod tests {
         assert!(!pulses.lack(until) && pulses.lack(until.after(1)));
     }
 
-    /// A boundary is known by its own instant and by the next one's: of a timer that does not end its half as planned nothing is known.
+    /// A boundary is known by its own instant and that of the next one: nothing is known of a timer that does not end its half as planned.
     #[test]
     fn a_boundary_that_is_not_as_planned_begins_anew() {
         for (late, early) in [(0, 0), (0, 7), (7, 0)] {
@@ -386,7 +386,7 @@ mod tests {
         }
     }
 
-    /// The boundaries of a PWM timer against control, for so many periods: each finds its half, and control knows it again. Returns how many.
+    /// The boundaries of a PWM timer against control, over this many periods: each finds its half, and control recognises it. Returns their number.
     fn drive(mut pulses: Pulses, half_ticks: u32, rate: f32) -> u32 {
         let (history, planned) = (History::new(), Planned::new());
         let mut boundary = (Instant(half_ticks), Instant(2 * half_ticks));
@@ -420,7 +420,7 @@ mod tests {
         boundaries
     }
 
-    /// A carrier from two halves a control period to many periods a half, and a modulator at rest and pulsing.
+    /// A carrier from two halves per control period to many periods per half, with a modulator at rest and pulsing.
     #[test]
     fn every_boundary_finds_the_half_that_was_planned_for_it() {
         for max_hz in [10_000.0, 9_000.0, 5_000.0, 2_400.0, 900.0] {
@@ -429,7 +429,7 @@ mod tests {
         }
     }
 
-    /// A locked carrier of a machine that switches once a control period has up to five halves in one.
+    /// A locked carrier of a machine that switches once a control period has up to five halves in a period.
     #[test]
     fn every_boundary_of_a_locked_carrier_finds_its_half() {
         let (ordinary, half_ticks) = pulses(10_000.0);

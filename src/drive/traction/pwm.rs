@@ -10,10 +10,10 @@ use crate::protection::{self, DiodeWatch, FailedCheck, Fault, MaskedFaults, Open
 use crate::time::{Clock, Instant};
 use core::sync::atomic::Ordering;
 
-/// By which part of a control period control may be late before the PWM interrupt calls it lost: more than it takes to enter it.
+/// Part of a control period by which control may be late before the PWM interrupt considers it lost: more than it takes to enter it.
 const CONTROL_LATE_PART: u32 = 16;
 
-/// Phase current, as a share of the largest, whose sign may change within a half.
+/// Phase current, as a share of the largest, below which the sign may change within a half.
 const SMALL_CURRENT_SHARE: f32 = 0.05;
 
 /// The PWM interrupt's task, for a machine.
@@ -23,7 +23,7 @@ pub struct PwmTask<M = &'static Tables> {
     /// The last boundary, and the next one, which is the nominal instant of the next call.
     at: Instant,
     begins: Instant,
-    /// Length of the half that begins there, in ticks.
+    /// Length of the half that begins at that next boundary, in ticks.
     period_ticks: u32,
     /// `true` if that half has pulses.
     pulses: bool,
@@ -38,7 +38,7 @@ pub struct PwmTask<M = &'static Tables> {
 }
 
 impl<M: Machine> PwmTask<M> {
-    /// A task whose first call is at `first`, with all gates off until then and for one half more.
+    /// A task whose first call is at `first`, with all gates off until then and for one more half.
     pub const fn new(machine: M, settings: Settings, first: Instant) -> Self {
         Self {
             machine,
@@ -56,20 +56,20 @@ impl<M: Machine> PwmTask<M> {
         }
     }
 
-    /// The same without a check.
+    /// The same task without a check.
     pub const fn without(mut self, masked: MaskedFaults) -> Self {
         self.masked = masked;
         self
     }
 
-    /// The same for a timer whose first two halves, before the first one that is planned, have another length.
+    /// The same task for a timer whose first two halves, before the first planned one, have another length.
     pub const fn after_halves_of(mut self, ticks: u32) -> Self {
         self.period_ticks = ticks;
         self
     }
 
-    /// The PWM timer's interrupt, at a carrier boundary, or where control has revised pulses. Deadline: the next boundary, where the shadow
-    /// registers take over. Says whether it came for a boundary.
+    /// The PWM timer's interrupt, at a carrier boundary, or when control has revised pulses. Deadline: the next boundary, where the shadow registers
+    /// take over. Returns `true` if it came for a boundary.
     pub fn run(&mut self, port: &mut impl PwmPort, shared: &Shared) -> bool {
         let boundary = port.begin();
         if boundary {
@@ -113,8 +113,8 @@ impl<M: Machine> PwmTask<M> {
         );
     }
 
-    /// The PWM interrupt when it is no boundary that it comes for, but what [`ControlPort::begin`](crate::ports::ControlPort::begin) asks for:
-    /// loads the next half as it was planned anew, if its boundary is still ahead.
+    /// The PWM interrupt when it comes not for a boundary but for a request of [`ControlPort::begin`](crate::ports::ControlPort::begin): loads the
+    /// next half as revised, if its boundary is still ahead.
     #[inline(never)]
     pub fn revise(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         let newest = shared.planned.last().map(PlannedRecord);
@@ -126,7 +126,7 @@ impl<M: Machine> PwmTask<M> {
         }
     }
 
-    /// Gives the port what makes the legs do as the half says.
+    /// Gives the port the events that make the legs follow the half.
     #[inline(always)]
     fn play(
         &mut self,
@@ -213,7 +213,7 @@ impl<M: Machine> PwmTask<M> {
         self.latch(Trip { fault, value, limit, at: now, safe }, shared);
     }
 
-    /// The electrical speed, in rad/s, and the link's voltage, in V, as control told them last.
+    /// The electrical speed, in rad/s, and the link's voltage, in V, as last told by control.
     fn told(&self, newest: Option<&PlannedRecord>) -> (f32, f32) {
         let (rate, udc_v) = match newest {
             Some(half) => (half.rate(), half.udc_v()),
@@ -222,12 +222,12 @@ impl<M: Machine> PwmTask<M> {
         (rate * self.settings.clock.ticks_per_s / UNITS_PER_RADIAN, udc_v)
     }
 
-    /// As control's `stay_safe`, for where control is lost: by what it told last.
+    /// The counterpart of control's `stay_safe` for when control is lost, based on what it last told.
     #[cold]
     #[inline(never)]
     fn stay_safe(&mut self, trip: Trip, port: &mut impl PwmPort, shared: &Shared) {
         if trip.at == self.at {
-            // The interrupt that has found it is long enough.
+            // The interrupt that has found the fault is long enough.
             return;
         }
         let (omega, udc_v) = self.told(shared.planned.last().map(PlannedRecord).as_ref());
@@ -240,7 +240,7 @@ impl<M: Machine> PwmTask<M> {
         }
     }
 
-    /// A half that was loaded after its beginning: the board has turned the gates off.
+    /// The check for a half that was loaded after its beginning: the board has turned the gates off.
     fn check_late(&mut self, port: &mut impl PwmPort, shared: &Shared) {
         if port.is_late() && self.trip.is_none() {
             let (fault, safe) = (Fault::PwmDeadline, SafeState::GatesOff);
@@ -258,14 +258,14 @@ impl<M: Machine> PwmTask<M> {
     }
 }
 
-/// The control interrupt that should have come by `now` and has not: how long ago the last one began, in s.
+/// The failed check of a control interrupt that should have come by `now` and has not; with the time since the last one began, in s.
 pub(in crate::drive) fn stale(now: Instant, began: Instant, clock: &Clock) -> Option<FailedCheck> {
     let age = now.since(began);
     let limit = (clock.control_ticks + clock.control_ticks / CONTROL_LATE_PART) as i32;
     (age > limit).then(|| (Fault::StaleCommand, clock.seconds(age), clock.seconds(limit)))
 }
 
-/// The half that control should have planned for `now` and has not: how long ago the boundary of the newest one was, in s.
+/// The failed check of a half that control should have planned for `now` and has not; with the time since the boundary of the newest one, in s.
 fn unplanned(now: Instant, newest: Instant, clock: &Clock) -> Option<FailedCheck> {
     let age = now.since(newest);
     (age > 0).then(|| (Fault::StaleCommand, clock.seconds(age), 0.0))

@@ -7,17 +7,18 @@ use crate::machine::Ratings;
 use crate::modulation::Mode;
 use crate::time::Instant;
 
-/// Sectors of 60° in which the load angle follows the voltage, where one pattern takes over from another. Chosen by trial: with one 12 N·m are
-/// missing at the end of square wave, with four 2.
+/// Sectors of 60° in which the load angle follows the voltage when one pattern takes over from another. Chosen by trial: with one sector, 12 N·m are
+/// missing at the end of square wave; with four, 2.
 const TRANSITION_SECTORS: u32 = 4;
 
-/// Rate at which the voltage falls from square wave to the one that the torque needs, and rises after a carrier, in shares of six-step per second.
+/// Rate at which the voltage falls from square wave to the voltage that the torque needs, and rises after a carrier, in shares of six-step per
+/// second.
 const EXIT_PER_S: f32 = 12.0;
 
-/// Flux linkage that the voltage forces, over the magnets', above which torque does not pass through zero.
+/// Ratio of the flux linkage that the voltage forces to the magnets', above which torque does not pass through zero.
 const ONE_SIDED_FLUX: f32 = 1.1;
 
-/// Rest of a torque that keeps its sign, as a share of the largest.
+/// Remainder of a torque that keeps its sign, as a share of the largest.
 const ONE_SIDED_SHARE: f32 = 0.001;
 
 /// Length of the pause in which torque changes its sign in square wave, in s: two committed halves, then the machine's currents
@@ -30,14 +31,14 @@ pub(super) struct SixStepExit {
     filled_to: f32,
     /// Fundamental up to which a pattern after a carrier has opened, likewise.
     opened_to: f32,
-    /// The last torque, in N·m, none as the least positive one; 0 before the first. Its sign is the side of the flux circle on which the
-    /// machine is: no torque lies with the positive ones there.
+    /// The last torque, in N·m, where zero counts as the least positive one; 0 before the first. Its sign is the side of the flux circle on which the
+    /// machine is: there, zero torque lies with the positive ones.
     side_nm: f32,
-    /// Mode that the newest command was made for, and the halves in which its load angle still changes with the voltage.
+    /// Mode that the newest command was made for, and the number of halves in which its load angle still changes with the voltage.
     unsettled: (Mode, u32),
     /// The boundary that was counted last.
     counted: Instant,
-    /// Time for which the gates are still off for torque to change its sign, in s.
+    /// Time for which the gates remain off for torque to change its sign, in s.
     crossing_s: f32,
 }
 
@@ -53,13 +54,13 @@ impl SixStepExit {
         }
     }
 
-    /// No pulses for a control period, no torque, and no side.
+    /// A control period without pulses: no torque, and no side.
     pub(super) fn rest(&mut self, period_s: f32) {
         self.side_nm = 0.0;
         self.crossing_s -= period_s;
     }
 
-    /// True while the gates are to be off until torque has another sign.
+    /// True while the gates are to be off until torque has the other sign.
     pub(super) fn crosses(&self) -> bool {
         self.crossing_s > 0.0
     }
@@ -69,9 +70,9 @@ impl SixStepExit {
         self.side_nm = if torque_nm == 0.0 { f32::MIN_POSITIVE } else { torque_nm };
     }
 
-    /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs: in square wave,
-    /// after it for as long as the voltage falls from there to what the torque `needed` in the last period, once the load
-    /// angle has followed, and while that is less than the `least` near the frequency at which only square wave is left.
+    /// The largest fundamental as a share of six-step, and whether it is to be used whatever the torque needs. That is the case in square wave; after
+    /// it while the voltage falls from there to what the torque `needed` in the last period, once the load angle has followed; and while that need is
+    /// below the `least` near the frequency at which only square wave remains.
     pub(super) fn fill(
         &mut self,
         decided: Mode,
@@ -88,7 +89,7 @@ impl SixStepExit {
         if self.unsettled.1 == 0 {
             self.filled_to -= step;
         }
-        // Not before the first operating point, of which nothing is known.
+        // Not before the first operating point, when nothing is known of it.
         if self.filled_to < least && needed > 0.0 {
             let more = step + if before > needed { before } else { needed };
             self.filled_to = if more < least { more } else { least };
@@ -100,9 +101,10 @@ impl SixStepExit {
         (if self.filled_to < largest { self.filled_to } else { largest }, true)
     }
 
-    /// The fundamental that an operating point may use, as a share of six-step: all of the `largest`, but for a pattern that follows a carrier, which begins with the
-    /// carrier's and opens from there, and below a `ceiling` near the frequency at which a free carrier takes over. A machine that the carrier weakened would change its
-    /// current within one half: of three such machines two tripped, and a car's took 12 % more current than either mode has; now the three take 4 % more at most.
+    /// The fundamental that an operating point may use, as a share of six-step: the whole `largest`, except for a pattern that follows a carrier,
+    /// which begins with the carrier's and opens from there, and below a `ceiling` near the frequency at which a free carrier takes over. Otherwise a
+    /// machine weakened by the carrier would change its current within one half: of three such machines two tripped, and a car's took 12 % more
+    /// current than in either mode; now the three take 4 % more at most.
     pub(super) fn open(&mut self, follows: Regulated, [ceiling, largest]: [f32; 2], period_s: f32) -> f32 {
         let most = if ceiling < 1.0 { ceiling } else { 1.0 };
         let opened = self.opened_to + EXIT_PER_S * period_s;
@@ -115,15 +117,16 @@ impl SixStepExit {
         if self.opened_to < largest && !is_whole { self.opened_to } else { largest }
     }
 
-    /// The part of a modulation index that has been opened, by which the mode is chosen: a carrier gives way to the pattern that begins where it ends.
+    /// The part of a modulation index that has been opened, by which the mode is chosen: a carrier gives way to the pattern that begins where it
+    /// ends.
     pub(super) fn opened(&self, modulation_index: f32) -> f32 {
         if modulation_index < self.opened_to { modulation_index } else { self.opened_to }
     }
 
-    /// The torque demanded, in N·m, which keeps its sign, at first the demand's, for as long as the voltage forces more flux upon the
-    /// machine than its magnets have, whose EMF is given in V: near no torque the two signs then lie far apart on the circle of flux
-    /// linkage, and the way between them goes past currents beyond the largest. So once there is no torque left the gates pause: the
-    /// flux falls to that of the magnets, and the pattern catches the machine on the other side.
+    /// The demanded torque, in N·m, which keeps its sign (at first the demand's) for as long as the voltage forces more flux upon the machine than
+    /// its magnets have, whose EMF is given in V. Near zero torque the two signs then lie far apart on the circle of flux linkage, and the way
+    /// between them passes through currents beyond the largest. So once no torque is left the gates pause: the flux falls to that of the magnets, and
+    /// the pattern catches the machine on the other side.
     pub(super) fn one_sided(&mut self, torque_nm: f32, emf_v: f32, udc_v: f32, ratings: &Ratings) -> f32 {
         let least_nm = ONE_SIDED_SHARE * ratings.max_torque_nm;
         let side_nm = if self.side_nm == 0.0 { torque_nm } else { self.side_nm };
@@ -140,7 +143,7 @@ impl SixStepExit {
         sided_nm
     }
 
-    /// True once the load angle has followed a pattern that took over from another, when a decision is made.
+    /// True once the load angle has followed a pattern that took over from another; called when a decision is made.
     pub(super) fn is_settled(&mut self, decision: &Decision) -> bool {
         let Decision { boundary, mode: decided, .. } = *decision;
         let (mode, halves) = &mut self.unsettled;
@@ -164,7 +167,7 @@ mod tests {
     /// With a least torque of 3 N·m.
     const RATINGS: Ratings = Ratings { max_torque_nm: 3_000.0, ..BUILT_IN.ratings };
 
-    /// Out of square wave.
+    /// The exit out of square wave.
     fn exit(side_nm: Option<f32>) -> SixStepExit {
         let mut exit = SixStepExit::new();
         assert_eq!(exit.fill(Mode::Square, [-1.0, 0.97], 0.4, 1.0), (0.97, true));
@@ -235,7 +238,8 @@ mod tests {
         assert_eq!(exit.open(Regulated::Fundamental, [2.0, 0.75], 0.0), 0.75);
     }
 
-    /// Near the free carrier's frequency a pattern has no more than the ceiling, at once, and square wave gives way by it though its own voltage is what it is.
+    /// Near the free carrier's frequency a pattern has at once no more than the ceiling, and square wave gives way by it, although its own voltage is
+    /// fixed.
     #[test]
     fn a_pattern_closes_to_where_the_free_carrier_begins() {
         let period_s = 1.0 / 48.0;

@@ -4,41 +4,41 @@ use super::pulses::{Half, Pulses};
 use crate::modulation::Mode;
 use crate::time::{Clock, Instant};
 
-/// Control periods within which an operating point serves another boundary: halves shorter than that make one for every second of them, as often as the
-/// free carrier's do.
+/// Control periods within which an operating point serves another boundary: shorter halves make an operating point for every second of them, as often
+/// as the free carrier's do.
 const SERVES_PERIODS: u32 = 3;
 
-/// The same after a single half of less than two periods, which leaves none for a point: as much more as such a half.
+/// The same after a single half of less than two periods, which leaves no period for an operating point: longer by such a half.
 const LATE_SERVES_PERIODS: u32 = SERVES_PERIODS + 2;
 
-/// The decision of a boundary: the mode of the half that begins at the one after it.
+/// The decision at a boundary: the mode of the half that begins at the boundary after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Decision {
     pub boundary: Instant,
     pub mode: Mode,
     /// The mode of the half before it.
     pub before: Mode,
-    /// The mode of the half behind it, as far as it is decided.
+    /// The mode of the half after it, as far as it is decided.
     pub after: Mode,
 }
 
 impl Decision {
-    /// `true` of a pattern's first half behind another one.
+    /// `true` for a pattern's first half after another pattern.
     pub const fn joins(&self) -> bool {
         self.before.is_pattern() && self.mode.is_pattern() && self.before as u8 != self.mode as u8
     }
 
-    /// `true` of a pattern's last half before another, which leads to that one's operating point: an optimised pattern's always. One of whole edges that gives
-    /// way to more carriers leaves the way there to them: its zero vector would last so much longer, and at a third to half of the torque and 1,800 V take
-    /// 45 N·m beyond its ripple.
+    /// `true` for a pattern's last half before another, which leads to that one's operating point; always for an optimised pattern. A pattern of
+    /// whole edges that gives way to more carriers leaves the transition to them: otherwise its zero vector would last so much longer, and at a third
+    /// to half of the torque and 1,800 V this would take 45 N·m beyond its ripple.
     pub const fn leads(&self) -> bool {
         let Self { mode, after, .. } = self;
         let of_edges = mode.is_pattern() && after.is_pattern() && after.carriers() < mode.carriers();
         of_edges || mode.is_optimal() && after.is_optimal() && *after as u8 != *mode as u8
     }
 
-    /// `true` if an operating point for one serves the other, too: that of the same boundary and mode, and that of one before which is less than
-    /// [`SERVES_PERIODS`] away, or [`LATE_SERVES_PERIODS`] where nothing newer could be made.
+    /// `true` if an operating point for one serves the other, too: one of the same boundary and mode, or one of an earlier boundary less than
+    /// [`SERVES_PERIODS`] away, or [`LATE_SERVES_PERIODS`] if nothing newer could be made.
     pub fn serves(&self, other: &Self, clock: &Clock, nothing_newer: bool) -> bool {
         let away = other.boundary.since(self.boundary) as u32;
         let periods = if nothing_newer { LATE_SERVES_PERIODS } else { SERVES_PERIODS };
@@ -46,24 +46,24 @@ impl Decision {
     }
 }
 
-/// The work of a control period. A boundary uses the last command that is valid by then, and of those before it nothing: so each
-/// command is made once, in the period before it is used, and its operating point one period earlier. Where a carrier half is shorter
-/// than two periods, both are made in one.
+/// The work of a control period. A boundary uses the last command that is valid by then and none of those before it. So each command is made once, in
+/// the period before it is used, and its operating point one period earlier. If a carrier half is shorter than two periods, both are made in one
+/// period.
 pub(super) struct Slot {
-    /// Its nominal instant.
+    /// The period's nominal instant.
     pub now: Instant,
     pub key: Decision,
     /// `true` if the boundary uses the command of this period.
     pub commands: bool,
-    /// `true` if it uses that of the next one.
+    /// `true` if the boundary uses the command of the next period.
     pub aims: bool,
-    /// `true` if halves last less than two periods, so that no period is left between the operating point and the command: not for the sake of a single
-    /// half, as where a pattern catches up with its angle.
+    /// `true` if halves last less than two periods, so that no period is left between the operating point and the command; not set for a single short
+    /// half, as when a pattern catches up with its angle.
     pub folds: bool,
 }
 
 impl Slot {
-    /// The period that begins at `now`. While nothing is known of the modulator each one may be the last.
+    /// The work of the period that begins at `now`. While nothing is known of the modulator each period may be the last.
     #[inline(always)]
     pub(super) fn of(pulses: &Pulses, now: Instant, clock: &Clock) -> Self {
         let Some(last) = pulses.last() else {
@@ -83,7 +83,7 @@ impl Slot {
         }
     }
 
-    /// Ticks from the boundary that uses the command, this period's or the next one's, until the command after it is valid; none or fewer where that
+    /// Ticks from the boundary that uses the command, this period's or the next one's, until the following command is valid; zero or negative if that
     /// boundary comes later.
     #[inline(always)]
     pub(super) fn used_ticks(&self, clock: &Clock) -> i32 {
@@ -102,7 +102,7 @@ mod tests {
     use crate::frames::{Abc, Angle};
     use crate::modulation::{Reference, Schedule, SwitchLimits};
 
-    /// Periods of two hundred that have both, with a free carrier of such halves, so long after a control period.
+    /// Number of periods out of two hundred that have both, for a free carrier of such halves, this long after a control period.
     fn folded(half_ticks: u32, phase_ticks: u32) -> usize {
         let clock = Clock::new(25_000_000, 2_500);
         let devices =
@@ -136,7 +136,7 @@ mod tests {
     fn slices_fold_where_a_half_is_shorter_than_two_periods() {
         assert!(folded(4_999, 1_250) > 80 && folded(2_000, 1_250) > 150);
         assert_eq!([5_000, 5_001, 13_889].map(|half_ticks| folded(half_ticks, 1_250)), [0; 3]);
-        // Where boundaries come with control's own periods every half that is planned is loaded.
+        // If boundaries coincide with control's own periods, every planned half is loaded.
         assert!(folded(2_500, 0) > 150, "{}", folded(2_500, 0));
     }
 
@@ -164,8 +164,8 @@ mod tests {
         }
     }
 
-    /// An operating point serves its own boundary and those of the same mode that come less than three periods after it, also where instants wrap; none that
-    /// came before.
+    /// An operating point serves its own boundary and those of the same mode that come less than three periods after it, also when instants wrap, but
+    /// no earlier boundary.
     #[test]
     fn an_operating_point_serves_its_mode_for_less_than_three_periods() {
         let clock = Clock::new(25_000_000, 2_500);

@@ -1,4 +1,4 @@
-//! The commands that are followed, and the reasons why the others are not.
+//! The commands that are followed, and the reasons for refusing the others.
 
 use super::{Edges, Operator, Phase};
 use crate::operator::line::{Discharge, Precharge};
@@ -65,7 +65,7 @@ impl<D: Demands> Operator<D> {
             let waiting = matches!(self.phase, Phase::Fault { .. });
             return self.refuse(if waiting { Refusal::FaultNotAcknowledged } else { Refusal::NoFault });
         };
-        // Gates that were off may have become a short circuit since.
+        // Gates that were off may have become a short circuit since then.
         let shorted = input.observed.trip.unwrap_or(trip).safe != SafeState::GatesOff;
         let held = if shorted {
             health::shorted_current(input, settings).is_some()
@@ -77,7 +77,7 @@ impl<D: Demands> Operator<D> {
         if held || health::cause(input, false, settings).is_some() {
             return self.refuse(Refusal::CauseStillPresent);
         }
-        // Zero is what both interrupts begin with.
+        // Both interrupts begin with zero.
         self.acknowledge = match self.acknowledge.wrapping_add(1) {
             0 => 1,
             number => number,
@@ -113,7 +113,7 @@ impl<D: Demands> Operator<D> {
             (levels.off, Refusal::OffRequested),
             (feedback.parameters_open, Refusal::ParametersOpen),
             (!feedback.enable_input, Refusal::EnableInputLow),
-            // Not a number is no voltage.
+            // NaN is not a voltage.
             (
                 observed.udc_v.is_nan() || observed.udc_v < settings.ratings.dc_link_min_v,
                 Refusal::LinkNotCharged,

@@ -23,12 +23,12 @@ pub enum Outcome {
     Unknown = 1,
     /// The value is out of the parameter's range.
     OutOfRange = 2,
-    /// The drive is enabled: written is only while the gates cannot pulse.
+    /// The drive is enabled: parameters are written only while the gates cannot pulse.
     Enabled = 3,
 }
 
 impl Outcome {
-    /// All, by their codes.
+    /// All outcomes, by their codes.
     pub const ALL: [(Self, &'static str); 4] = [
         (Self::Done, "done"),
         (Self::Unknown, "unknown"),
@@ -59,7 +59,7 @@ impl ParameterAnswer {
         payload
     }
 
-    /// From a frame's content; `None` for an outcome that is none.
+    /// From a frame's content; `None` for an invalid outcome.
     pub fn decode(payload: Payload) -> Option<Self> {
         let (outcome, _) = *Outcome::ALL.get(ANSWER_RESULT.raw(payload) as usize)?;
         let parameter = ANSWER_PARAMETER.raw(payload) as u8;

@@ -26,7 +26,7 @@ const PAGES: u32 = 3;
 /// The counts of the frames received, in pages.
 pub const COUNTERS: Message = Message::new("COUNTERS", 0x187, 11, 100, &COUNTER_SIGNALS);
 
-/// The counts of the frames received. Counts wrap; every frame received is counted once more, in one of the others but `lost`.
+/// The counts of the frames received. Counts wrap; every frame received is counted a second time in one of the other counts except `lost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counts {
@@ -36,13 +36,13 @@ pub struct Counts {
     pub taken: u32,
     /// Frames missing in a sequence that went on.
     pub lost: u32,
-    /// Frames with an identifier that is none of ours.
+    /// Frames with an identifier that is not one of ours.
     pub unknown: u32,
     /// Frames of another length than eight bytes.
     pub truncated: u32,
     /// Frames with a wrong CRC.
     pub corrupted: u32,
-    /// Frames with the counter of the one before.
+    /// Frames with the same counter as the one before.
     pub repeated: u32,
     /// Frames whose counter is too far from the last.
     pub disordered: u32,
@@ -80,7 +80,7 @@ impl Counts {
         payload
     }
 
-    /// Takes over one page of the message; counts come with their lower 16 bits.
+    /// Adopts one page of the message; counts come with their lower 16 bits.
     pub fn merge(&mut self, payload: Payload) {
         let mut counts = self.to_array();
         for (signal, count) in COUNTER_SIGNALS.iter().skip(1).zip(&mut counts) {

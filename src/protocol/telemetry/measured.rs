@@ -7,7 +7,7 @@ use crate::protocol::signal::{Payload, Signal};
 
 /// Range of every current, in A.
 pub(in crate::protocol) const CURRENT_A: [f32; 2] = [-3_000.0, 3_000.0];
-/// Range of every speed that is told, in r/min.
+/// Range of every transmitted speed, in r/min.
 pub(in crate::protocol) const SPEED_RPM: [f32; 2] = [-16_000.0, 16_000.0];
 
 /// Range of the stator frequency, in Hz.
@@ -41,7 +41,7 @@ pub const VOLTAGES: Message = Message::new("VOLTAGES", 0x184, 8, 10, &[VOLTAGE, 
 pub const TORQUE_ESTIMATE: Message =
     Message::new("TORQUE_ESTIMATE", 0x189, 13, 10, &[ESTIMATE]).telling(12, &[Quantity::Torque]);
 
-/// The measurements, and what control makes of them. `None`: not available.
+/// The measurements, and the values that control derives from them. `None`: not available.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measured {
@@ -49,7 +49,7 @@ pub struct Measured {
     pub speed_rpm: Option<f32>,
     /// Torque demand after envelope, slew and limits, in N·m.
     pub torque_nm: Option<f32>,
-    /// Torque of the machine by its currents, its flux map and the map's error as far as it is known, in N·m.
+    /// Torque of the machine from its currents, its flux map and the map's error as far as it is known, in N·m.
     pub torque_estimate_nm: Option<f32>,
     /// DC-link voltage, in V.
     pub link_v: Option<f32>,
@@ -99,7 +99,7 @@ impl Measured {
         encode(&[(&ESTIMATE, self.torque_estimate_nm)], scales)
     }
 
-    /// Takes over what a message of these four says, without its mark.
+    /// Adopts the content of one of these four messages, without its mark.
     pub fn merge(&mut self, message: &Message, payload: Payload, scales: Scales) {
         match message.id {
             id if id == MOTION.id => {

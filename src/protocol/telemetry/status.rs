@@ -20,7 +20,7 @@ pub(in crate::protocol) const CHOPPER: Signal =
     Signal { bits: 8, ..Signal::physical("chopper_percent", "%", 48, 0.5, [0.0, 100.0]) };
 pub(in crate::protocol) const TAKEN: Signal = Signal::number("taken", 56, 8, 0xFF);
 
-/// The code of a pulse pattern, or of where the zero vectors lie: room for [`MODE_CODES`] of them.
+/// The code of a pulse pattern, or of the place of the zero vectors: room for [`MODE_CODES`] of them.
 pub(in crate::protocol) const fn pattern(name: &'static str) -> Signal {
     Signal::number(name, 37, MODE_CODES.ilog2(), MODE_CODES - 1)
 }
@@ -39,10 +39,10 @@ pub const STATUS: Message = Message::new(
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Listening {
-    /// No command has come yet, or it has been silent for so long that the drive is off.
+    /// No command has come yet, or there has been silence for so long that the drive is off.
     #[default]
     Off = 0,
-    /// The newest command holds.
+    /// The newest command is in force.
     Fresh = 1,
     /// Silent for some time: torque zero.
     ZeroTorque = 2,
@@ -54,11 +54,11 @@ impl Listening {
         [(Self::Off, "off"), (Self::Fresh, "fresh"), (Self::ZeroTorque, "zero_torque")];
 }
 
-/// The pulse pattern of the gates, as the status has it.
+/// The pulse pattern of the gates, as the status carries it.
 pub trait Pattern: Copy {
     /// Its code, below [`MODE_CODES`].
     fn code(self) -> u32;
-    /// The one with this code; the default one for a code that is none.
+    /// The pattern with this code; the default one for an invalid code.
     fn from_code(code: u32) -> Self;
 }
 
@@ -90,7 +90,7 @@ impl Pattern for Scheme {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StatusFrame<P = Mode> {
-    /// The state; `None` for a code that is none.
+    /// The state; `None` for an invalid code.
     pub state: Option<State>,
     /// Code of the fault, 0 for none.
     pub fault: u8,
@@ -98,7 +98,7 @@ pub struct StatusFrame<P = Mode> {
     pub refusal: Option<Refusal>,
     /// Commands refused, modulo 32.
     pub refusals: u8,
-    /// Pulse pattern, or where the zero vectors lie.
+    /// Pulse pattern, or the place of the zero vectors.
     pub mode: P,
     /// The use that is made of the newest command.
     pub listening: Listening,
@@ -111,7 +111,7 @@ pub struct StatusFrame<P = Mode> {
 }
 
 impl<P: Pattern> StatusFrame<P> {
-    /// Of the drive's status.
+    /// The frame of the drive's status.
     pub fn new<T>(status: &Status<T>, mode: P, listening: Listening, counts: &Counts) -> Self {
         Self {
             state: Some(status.state),

@@ -1,4 +1,4 @@
-//! The temperatures, and what they leave of the torque.
+//! The temperatures, and the share of the torque that they leave.
 
 use crate::protocol::message::Message;
 use crate::protocol::signal::{Payload, Signal};
@@ -16,7 +16,7 @@ const MAGNETS: Signal = celsius("magnets_c", 45);
 const SHARE: Signal =
     Signal { bits: 8, ..Signal::physical("torque_share_percent", "%", 56, 0.5, [0.0, 100.0]) };
 
-/// Temperatures; of a drive that knows its sensors.
+/// Temperatures; sent by a drive that knows its sensors.
 pub const TEMPERATURES: Message =
     Message::new("TEMPERATURES", 0x18C, 16, 100, &[WINDING, HEAT_SINK, JUNCTION, MAGNETS, SHARE]);
 

@@ -1,4 +1,4 @@
-//! The same for the ZS9.
+//! The exchange with the rig for the ZS9.
 
 use super::{COMMAND, CONTROL_ANSWERS, IDLE_ANSWERS, PWM_ANSWERS, exchange, finish, keep, open_files, send};
 use crate::board::qemu::{DUAL_RECORDER, watch};
@@ -33,7 +33,7 @@ pub fn sample_dual(now: Instant) -> DualSample {
     sample
 }
 
-/// The rig's command beside the newest sample.
+/// The rig's command that came with the newest sample.
 #[inline(never)]
 pub fn command_dual() -> DualDriveCommand {
     wire::dual_command_from_words(COMMAND.each_ref().map(|word| word.load(Ordering::Relaxed)))
@@ -45,7 +45,7 @@ pub fn scheme_dual() -> Scheme {
     command_dual().scheme
 }
 
-/// Its link voltage, in V.
+/// The link voltage of that command, in V.
 #[inline(never)]
 pub fn link_ref_dual() -> f32 {
     command_dual().link_ref_v
@@ -83,7 +83,7 @@ pub fn leave_dual(now: Instant) {
     send(&DualRequest::Leave(now).to_block());
 }
 
-/// The frame that has come, and what the board says.
+/// The received frame and the board's feedback.
 #[inline(never)]
 pub fn ask_dual(at: Instant) -> (Feedback, Option<Frame>) {
     let mut block = DualRequest::Ask(at).to_block();

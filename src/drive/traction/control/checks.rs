@@ -1,4 +1,4 @@
-//! The checks of a period, and the trip that comes of them.
+//! The checks of a period, and the trip that follows from them.
 
 use super::ControlTask;
 use crate::control::{ControlLaw, Measurements};
@@ -8,9 +8,9 @@ use crate::ports::{ControlPort, DriveCommand, Sample};
 use crate::protection::{self, FailedCheck, OpenGates, SafeState, Trip};
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
-    /// Follows the angle; returns the electrical speed, in rad/s. An angle that cannot be, or is not known, leaves the speed as it was. It
-    /// may be unknown until it is known for the first time, while nobody wants pulses or the sensor counts. After a trip the angle is followed anew and its
-    /// speed told, to leave the safe state by; whatever chooses a safe state keeps to the speed at which the angle was lost.
+    /// Follows the angle; returns the electrical speed, in rad/s. An impossible or unknown angle leaves the speed as it was. Before it is known for
+    /// the first time, the angle may be unknown while nobody wants pulses or if the sensor counts. After a trip the angle is followed anew, and its
+    /// speed reported, for leaving the safe state; the choice of a safe state uses the speed at which the angle was lost.
     pub(super) fn track(
         &mut self,
         angle: Option<Angle>,
@@ -48,7 +48,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         (self.lost_at.unwrap_or(self.controller.omega()), lost)
     }
 
-    /// The fault of a period's input by itself.
+    /// The fault of a single period's input.
     #[inline(always)]
     pub(super) fn judge(
         &self,
@@ -59,12 +59,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if protection::is_sound(measured, omega, &command.demand, &self.machine.tables().ratings) {
             return None;
         }
-        // Copies: what stands behind a reference is in memory in every period.
+        // Copies: a value behind a reference would be in memory in every period.
         let (command, measured) = (*command, *measured);
         self.find_fault(&command, &measured, omega)
     }
 
-    /// The same for an input that may have one.
+    /// The same for an input that may have a fault.
     #[cold]
     #[inline(never)]
     fn find_fault(&self, command: &DriveCommand, measured: &Measurements, omega: f32) -> Option<FailedCheck> {
@@ -76,7 +76,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             .or_else(|| protection::check_demand(&command.demand))
     }
 
-    /// Nothing where the check that found it is switched off.
+    /// The failed check, unless it is switched off.
     pub(super) fn armed(&self, failed: Option<FailedCheck>) -> Option<FailedCheck> {
         failed.filter(|(fault, _, _)| !self.masked.has(*fault))
     }
@@ -110,8 +110,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.enter(Trip { fault, value, limit, at, safe }, port);
     }
 
-    /// A period without pulses of the control law: gates that are off become the short circuit where the machine goes on generating through the
-    /// diodes. Without a trip that is one: an operator takes the gates off at such a speed for a fault of his own or for `off`, else he waits.
+    /// A period without the control law's pulses: gates that are off become the short circuit if the machine keeps generating through the diodes. If
+    /// there is no trip yet, this is one: an operator takes the gates off at such a speed only for a fault of his own or for `off`; otherwise he
+    /// waits.
     #[cold]
     #[inline(never)]
     pub(super) fn stay_safe(&mut self, sample: &Sample, omega: f32, port: &mut impl ControlPort) {
@@ -133,7 +134,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.acknowledge.entered();
     }
 
-    /// First of all checks: a leg that is stuck decides on the safe state.
+    /// The first of all checks: a stuck leg decides on the safe state.
     pub(super) fn check_legs(&mut self, sample: &Sample, port: &mut impl ControlPort) {
         let found = port.leg_faults();
         if let (Some((fault, value, limit)), None) = (found.check(), self.trip) {

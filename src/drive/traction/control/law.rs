@@ -1,4 +1,4 @@
-//! The control law's part of a period: what the newest boundary teaches, the operating point, the command.
+//! The control law's part of a period: learning from the newest boundary, the operating point, the command.
 
 use super::super::applied::{Ahead, Steady, Wanted, committed, follows, interval_s, limits, passed};
 use super::super::current_delay::CurrentDelay;
@@ -16,15 +16,15 @@ use crate::ports::Sample;
 use crate::protection::{DiodeWatch, FrozenWatch, SafeState, UnexplainedWatch, safe_state};
 use crate::time::Instant;
 
-/// A demand that jumps by more than this share of the largest torque is worth revising the next half for.
+/// Share of the largest torque beyond which a jump of the demand is worth revising the next half.
 const JUMP_SHARE: f32 = 0.05;
 
-/// Control periods that the running half must still last for the next one to be revised: one until the command is valid, and one
-/// in which control sees what became of it.
+/// Control periods that the running half must still last for the next one to be revised: one until the command is valid, and one in which control
+/// sees the result.
 const REVISION_PERIODS: u32 = 2;
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
-    /// The control law's stages that this period is for, while pulses are made.
+    /// The stages of the control law that are due in this period, while pulses are made.
     #[inline(always)]
     pub(super) fn pulse(&mut self, input: Input, measured: &Measurements, slot: &Slot, shared: &Shared) {
         let tables = self.machine.tables();
@@ -33,14 +33,14 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.revises = self.is_to_revise(slot.now, &input.command.demand);
         let commands = slot.commands || self.revises;
         let is_own = |aimed: &Decision| aimed.boundary == slot.key.boundary;
-        // After a single short half no period was left for a point.
+        // After a single short half there was no period left for an operating point.
         let is_short = commands && !slot.folds;
         let serves = |aimed: &Decision| aimed.serves(&slot.key, &self.settings.clock, is_short);
         let served = || self.aimed.filter(|aimed| serves(aimed) && (L::POINT_SERVES || is_own(aimed)));
-        // A pattern's last half has a point of its own, and so has a boundary whose point was made early, after a jump.
+        // A pattern's last half needs its own operating point, and so does a boundary whose point was made early, after a jump.
         let is_old = |aimed: &Decision| is_own(aimed) || aimed.after != slot.key.after;
         let aims = (slot.aims || commands) && served().is_none_or(|aimed| slot.aims && is_old(&aimed));
-        // Not in the longest periods, either.
+        // Not in the longest periods.
         if !aims || slot.folds {
             self.controller.warm(input.command.warmth);
             self.gains.learn(measured.currents_a, tables.ratings.max_current_a, self.delay.scale);
@@ -53,7 +53,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         if slot.aims || (slot.commands && slot.folds) {
             self.look_ahead(input.sample.udc_v, slot);
         }
-        // Once a half, and not in the longest periods unless all are.
+        // Once a half, and in the longest periods only if all are.
         if slot.commands && (!aims || slot.folds) {
             self.learn_angle(measured.angle, here.frame);
         }
@@ -72,7 +72,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
-    /// Follows the link's ripple, once a half, and looks ahead to the halves that the command counts and makes.
+    /// Follows the link's ripple, once a half, and predicts it for the halves that the command takes into account and makes.
     #[inline(always)]
     fn look_ahead(&mut self, udc_v: f32, slot: &Slot) {
         let clock = &self.settings.clock;
@@ -94,13 +94,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         interval_s(slot.key.mode, self.controller.omega(), used_ticks, &self.settings)
     }
 
-    /// The delay of the current sensors at this speed.
+    /// The delay of the current sensors at the present speed.
     fn delayed(&self) -> CurrentDelay {
         let Settings { current_filter_ticks, clock, .. } = &self.settings;
         CurrentDelay::of(*current_filter_ticks, self.controller.omega(), clock)
     }
 
-    /// Learns the position sensor's errors from an angle and its direction; not where the speed tracker follows them, and not where counts look like errors.
+    /// Learns the position sensor's errors from an angle and its direction, unless the speed tracker follows them or counts look like errors.
     #[inline(always)]
     fn learn_angle(&mut self, angle: Angle, direction: SinCos) {
         let tracker = self.controller.tracker();
@@ -181,8 +181,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.diodes = DiodeWatch::new();
         self.watch.command(voltage.vector);
         self.reference = Reference {
-            // An optimised pattern is that of the operating point; the vector moves its edges. So is the pattern that another one leads to: the half in between
-            // takes the flux linkage there, which regulation would do once more.
+            // An optimised pattern is that of the operating point; the vector moves its edges. The same holds for the pattern that another one leads
+            // to: the half in between brings the flux linkage there, which regulation would do a second time.
             voltage_v: if mode.is_optimal() || slot.key.leads() {
                 voltage.steady_v
             } else {
@@ -197,8 +197,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         };
     }
 
-    /// `true` if the demand has jumped and the next half can still be changed: the running one lasts long enough, and the next one is
-    /// of the free carrier, whose length is always the same. An operating point from before a jump does not hold.
+    /// `true` if the demand has jumped and the next half can still be changed: the running half lasts long enough, and the next one belongs to the
+    /// free carrier, whose length is always the same. An operating point from before a jump is no longer valid.
     pub(super) fn is_to_revise(&mut self, now: Instant, demand: &Demand) -> bool {
         let change = demand.torque_nm - self.demand_nm;
         self.demand_nm = demand.torque_nm;
@@ -213,7 +213,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         revises
     }
 
-    /// A period without pulses of the control law: where nothing else makes a current flow either, the sensors show their zeros.
+    /// A period without the control law's pulses: if nothing else makes a current flow either, the sensors show their zeros.
     pub(super) fn rest_currents(&mut self, sample: &Sample, pulses: bool) {
         let ratings = &self.machine.tables().ratings;
         let open = safe_state(self.controller.omega(), sample.udc_v, ratings) == SafeState::GatesOff;
@@ -224,7 +224,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
-    /// No pulses: the control law begins anew.
+    /// No pulses: the control law is reset.
     pub(super) fn rest(&mut self, now: Instant, omega: f32, measured: &Measurements) {
         self.controller.idle();
         self.delay = self.delayed();
@@ -263,7 +263,8 @@ mod tests {
     use crate::modulation::SwitchLimits;
     use crate::time::Clock;
 
-    /// The mode that pulses would begin with goes by the machine's own EMF, and the start's pulses turn with it from where currents were taken.
+    /// The mode that pulses would begin with follows from the machine's own EMF, and the start's pulses turn with the machine from the instant of the
+    /// currents.
     #[test]
     fn at_rest_the_reference_turns_with_the_machine_without_voltage() {
         let clock = Clock::new(25_000_000, 2_500);

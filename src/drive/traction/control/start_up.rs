@@ -1,4 +1,4 @@
-//! The start of a drive whose position sensor only counts: the pulses of [`StartUp`] in the place of the control law's.
+//! The start of a drive whose position sensor only counts: pulses of [`StartUp`] in place of the control law's.
 
 use super::super::Shared;
 use super::super::applied::passed;
@@ -28,8 +28,8 @@ impl Starting {
 }
 
 impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
-    /// A control period at rest: where the drive is enabled and its sensor counts, a period of the search for the angle. `commands` is `None`
-    /// where the drive is not enabled, else `true` if the next boundary uses this period. `true` if it makes pulses.
+    /// A control period at rest: if the drive is enabled and its sensor counts, a period of the search for the angle. `commands` is `None` if the
+    /// drive is not enabled, else `true` if the next boundary uses this period. Returns `true` if the search makes pulses.
     #[cold]
     #[inline(never)]
     pub(super) fn start_up(
