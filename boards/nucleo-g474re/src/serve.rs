@@ -157,7 +157,7 @@ impl<S: Station> Serve<'_, S> {
         }
     }
 
-    /// One pass of the idle loop: takes the frames that have come, and serves the newest slot if not yet served. Says if it served one.
+    /// One pass of the idle loop: takes the frames that have come, and serves the newest slot if not yet served. Says whether it served one.
     pub fn pass(&mut self, slot: &mut Slot, mailboxes: &OperatorMailboxes, rated: &Settings) -> bool {
         self.collect();
         let settings = self.station.settings(rated);

@@ -1,6 +1,6 @@
 //! The gates' real states: two latches per gate on the driver board, read by SPI3 at every peak.
 //!
-//! For each gate the driver board latches if its device has been on and if it has been off. While the select line is low it shifts out two words, the
+//! For each gate the driver board latches whether its device has been on and whether it has been off. While the select line is low it shifts out two words, the
 //! most significant bit first; when the line goes high it starts over:
 //!
 //! | word | bits 15 … 9 | bits 8 … 0 |
