@@ -136,7 +136,7 @@ fn main() -> ExitCode {
             if let Some(usage) = error.downcast_ref::<clap::Error>() {
                 usage.exit();
             }
-            // One line: what was wrong, and where.
+            // One line: the error, and its place.
             eprintln!("{error:#}");
             ExitCode::from(2)
         }
@@ -190,7 +190,7 @@ fn command(command: Command) -> Result<ExitCode> {
     }
 }
 
-/// Says what is needed for the words, without doing anything.
+/// Prints what is needed for the words, without doing anything.
 fn needs(words: Vec<OsString>) -> Result<ExitCode> {
     let needs = match Cli::try_parse_from(std::iter::once("tractive-rig".into()).chain(words))?.command {
         Command::Run { words } => Needs::of_run(words)?,

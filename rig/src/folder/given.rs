@@ -1,4 +1,4 @@
-//! The limits of machine and inverter that a user gives with every folder that is made.
+//! The limits of machine and inverter that a user gives for every new folder.
 
 use crate::options::finite;
 use anyhow::{Result, ensure};
@@ -60,10 +60,10 @@ pub struct Range(pub &'static str, pub f64, pub f64, pub f64, pub &'static str);
 /// Least number that counts as above 0.
 pub const ABOVE_ZERO: f64 = 1e-9;
 
-/// The check that values are within their ranges.
+/// Checks that values are within their ranges.
 ///
 /// # Errors
-/// The first that is not, by its option.
+/// The first value that is not, by its option.
 pub fn check(ranges: &[Range]) -> Result<()> {
     for Range(option, value, least, most, unit) in ranges {
         let from = if *least == ABOVE_ZERO { "above 0,".to_owned() } else { format!("from {least}") };
@@ -90,7 +90,7 @@ impl Given {
         self.zs9_source.map_or(self.link_v()[2], |source_v| CAPACITORS[2] * source_v)
     }
 
-    /// The option that tells the voltage, as it was given.
+    /// The option that gives the voltage, as it was given.
     pub fn voltage_option(&self) -> String {
         match self.zs9_source {
             Some(source_v) => format!("--zs9-source {source_v}"),
@@ -108,13 +108,13 @@ impl Given {
         speed_rpm * f64::from(self.pole_pairs) * TAU / 60.0
     }
 
-    /// The name: the one that was said, or the folder's.
+    /// The name: the given one, or the folder's.
     pub fn name(&self) -> String {
         let folder = || self.out.file_name().map(|name| name.to_string_lossy().into_owned());
         self.name.clone().or_else(folder).unwrap_or_else(|| "machine".to_owned())
     }
 
-    /// The check of all of them, by themselves and together.
+    /// Checks all of them, each by itself and together.
     ///
     /// # Errors
     /// The first option that makes no sense.
@@ -150,7 +150,7 @@ impl Given {
         Ok(())
     }
 
-    /// The options as they were given, but for the folder.
+    /// The options as they were given, except the folder.
     pub fn told(&self) -> String {
         let Self { pole_pairs, rs, max_current, max_speed_rpm, max_switching_hz, .. } = self;
         let optional = [("udc-min", self.udc_min), ("udc-max", self.udc_max), ("inertia", self.inertia)];

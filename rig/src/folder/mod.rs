@@ -47,7 +47,7 @@ pub enum MachineCommand {
     Show(Show),
 }
 
-/// Does what the command says.
+/// Executes the command.
 ///
 /// # Errors
 /// One line that names option or file, value and what is allowed; then nothing was written.

@@ -35,8 +35,8 @@ pub struct Nameplate {
 const STEPS: i32 = 25;
 /// Steps beyond it.
 const BEYOND: i32 = 2;
-/// Steps along +d: as far as the pulses that find the angle at standstill go. Beyond the grid the map goes on straight, which would show them magnets on the
-/// wrong side.
+/// Steps along +d: as far as the pulses that find the angle at standstill go. Beyond the grid the map continues straight, which would make them detect
+/// magnets on the wrong side.
 const POSITIVE: i32 = (PULSE_SHARE * STEPS as f32) as i32 + 1;
 
 impl Nameplate {

@@ -9,7 +9,7 @@ use tractive_tablegen::{FluxMap, Optimum, Parameters, Patterns, SmoothMap};
 pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
     let smooth = SmoothMap::new(map);
     let reach_nm = Optimum::of(&smooth, given.pole_pairs, given.max_current_a).most_torque_nm();
-    // Less than the generator's own rounding.
+    // Below the generator's own rounding.
     let within = digits((1.0 - 1e-6) * reach_nm);
     let max_torque_nm = given.max_torque_nm.min(within);
     let max_power_w =
