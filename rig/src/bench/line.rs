@@ -118,8 +118,8 @@ impl LineSide {
         held.map(|(.., fault)| *fault)
     }
 
-    /// A control sample at `now`, `t_s`, with the rotor's angle known or not: the first one of every millisecond begins a slot. Returns whether the operator has
-    /// fallen behind.
+    /// A control sample at `now`, `t_s`, with the rotor's angle known or not: the first one of every millisecond begins a slot. Returns whether the operator
+    /// has fallen behind.
     pub fn sampled(&mut self, now: Tick, t_s: f64, position_known: bool) -> bool {
         let hardware = self.hardware(t_s);
         let temperatures = self.plan.heat.as_ref().map_or(Ratios::default(), |heat| heat.ratios(t_s));

@@ -7,8 +7,8 @@ use tractive::identification::Stage;
 
 /// Boundaries in a part that is taken relative to its own mean.
 const PART: usize = 100;
-/// Edges of uncertain sign after which a part ends: their possible error is no longer carried on. More for the turn, whose parts determine the magnets
-/// by the turn within them: with 8 the worst of 100 experiments had 0.43 % of the magnets' flux linkage wrong, with 5 0.53 %, by the law of pulses before this one.
+/// Edges of uncertain sign after which a part ends: their possible error is no longer carried on. More for the turn, whose parts determine the magnets by the
+/// turn within them: with 8 the worst of 100 experiments had 0.43 % of the magnets' flux linkage wrong, with 5 0.53 %, by the law of pulses before this one.
 const UNSURE_EDGES: f64 = 1.5;
 const UNSURE_EDGES_TURNING: f64 = 8.0;
 /// Shortest part.
