@@ -1,4 +1,4 @@
-//! `cargo rig bench`: how fast scenarios are simulated on one thread, and where the time goes.
+//! `cargo rig bench`: the speed of the simulation of scenarios on one thread, and where the time goes.
 
 use crate::options::{Options, RunOptions};
 use crate::plant::stopwatch::{self, processor_s};
@@ -26,7 +26,7 @@ pub struct BenchOptions {
 /// The options that every measurement has.
 #[derive(Clone, Debug, Args)]
 struct Common {
-    /// All scenarios unless some are named. Of one system's alone its own options may be named, too.
+    /// All scenarios unless some are named. If all are of one system, its own options may be given, too.
     scenarios: Vec<String>,
     /// The options that all runs share.
     #[command(flatten)]

@@ -29,7 +29,7 @@ pub struct FigureOptions {
     /// Print the pictures' names and what they show, and draw none.
     #[arg(long)]
     pub list: bool,
-    /// Write these beside each SVG, by rsvg-convert (Debian: librsvg2-bin).
+    /// Write these next to each SVG, by rsvg-convert (Debian: librsvg2-bin).
     #[arg(long, value_enum, value_name = "FORMAT", num_args = 1.., value_delimiter = ',')]
     pub also: Vec<Format>,
     /// Pixels of a PNG for one of the SVG.

@@ -86,7 +86,7 @@ pub struct RunOptions {
     /// A folder of tables/, or the path of any machine folder; default the system's own.
     #[arg(long)]
     pub machine: Option<String>,
-    /// Step of trace.csv, in s; default what the scenario needs.
+    /// Step of trace.csv, in s; default as the scenario needs.
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub dt: Option<f64>,
     /// Seed of the noise.
@@ -102,7 +102,7 @@ pub struct RunOptions {
     /// Dead time, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     pub dead_time_us: f64,
-    /// Shortest pulse, in µs; default 10, or of a machine whose devices switch faster than 900 Hz the same share of a carrier.
+    /// Shortest pulse, in µs; default 10, or, for a machine whose devices switch faster than 900 Hz, the same share of a carrier.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     pub min_pulse_us: Option<f64>,
     /// Resolution of the current converters, in bits.
@@ -114,10 +114,10 @@ pub struct RunOptions {
     /// DC-link ripple, V@HZ.
     #[arg(long)]
     pub udc_ripple: Option<Ripple>,
-    /// By how much the machine's true flux exceeds the map, in percent.
+    /// Excess of the machine's true flux over the map, in percent.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
     pub map_error: f64,
-    /// By how much the machine's true stator resistance exceeds the rating, in percent.
+    /// Excess of the machine's true stator resistance over the rating, in percent.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
     pub rs_error: f64,
     /// Error of the angle sensor, electrical, in degrees.

@@ -18,7 +18,7 @@ pub struct Wanted {
     /// Mode.
     #[arg(skip)]
     pub mode: Mode,
-    /// Fundamental, peak phase, in V; that of square wave is 2/π of the link, whatever is said.
+    /// Fundamental, peak phase, in V; in square wave it is 2/π of the link, whatever is given.
     #[arg(long = "u", id = "u", value_parser = not_negative, allow_negative_numbers = true)]
     pub voltage_v: f64,
     /// DC link, in V.

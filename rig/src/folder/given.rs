@@ -28,7 +28,7 @@ pub struct Given {
     /// Highest DC-link voltage in normal operation, in V; default 1.2 of the nominal one.
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
     pub udc_max: Option<f64>,
-    /// Voltage of a Z-source nine-switch inverter's source, in V, instead of a link's: shoot-through makes 4/3 of it of the capacitors' voltage, 3/2 at most.
+    /// Voltage of a Z-source nine-switch inverter's source, in V, instead of a link's: shoot-through raises the capacitors' voltage to 4/3 of it, 3/2 at most.
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true, conflicts_with_all = ["udc", "udc_min", "udc_max"])]
     pub zs9_source: Option<f64>,
     /// Largest speed, in r/min.
@@ -37,13 +37,13 @@ pub struct Given {
     /// Highest switching frequency of a device, in Hz.
     #[arg(long, value_name = "HZ", value_parser = finite, allow_negative_numbers = true)]
     pub max_switching_hz: f64,
-    /// Inertia of the rotor and what it drives, in kg·m²; without it full torque takes it to the largest speed in a second.
+    /// Inertia of the rotor and what it drives, in kg·m²; without it full torque reaches the largest speed in a second.
     #[arg(long, value_name = "KG_M2", value_parser = finite, allow_negative_numbers = true)]
     pub inertia: Option<f64>,
     /// Name of the machine; default that of the folder.
     #[arg(long)]
     pub name: Option<String>,
-    /// The folder to make. One that is there may hold a machine's two files, which are replaced, and nothing else.
+    /// The folder to make. An existing one may contain a machine's two files, which are replaced, and nothing else.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Print the ratings as JSON.

@@ -19,14 +19,14 @@ use tractive_tablegen::FluxMap;
 #[derive(Clone, Debug, Args)]
 pub struct Import {
     /// The map: a CSV with currents and flux linkages of both axes in named columns, in any order, with their units (`Id [A]`, `psi_q_mWb`,
-    /// `Flux Linkage D (Vs)`; A and Wb where none is said); the current's magnitude and angle (`Is`, `gamma [deg]`) may stand for both currents.
-    /// Further columns are left out.
+    /// `Flux Linkage D (Vs)`; A and Wb if none is given); the current's magnitude and angle (`Is`, `gamma [deg]`) may replace both currents. Further
+    /// columns are ignored.
     #[arg(value_name = "MAP.csv")]
     pub map: PathBuf,
     /// The meaning of its axes and signs.
     #[command(flatten)]
     pub reading: Reading,
-    /// Values are rms where their column does not say peak or rms.
+    /// Values are rms if their column does not say peak or rms.
     #[arg(long)]
     pub rms: bool,
     /// Factor of all flux linkages, for a map of one slot, one turn or another length.

@@ -18,12 +18,12 @@ pub struct Nameplate {
     /// Inductance across the magnets' flux, in H.
     #[arg(long, value_name = "H", value_parser = finite, allow_negative_numbers = true)]
     pub lq: f64,
-    /// Flux linkage of the magnets, peak, in Wb: peak phase voltage of the turning machine without current, over its electrical angular
-    /// speed; 0 without magnets.
+    /// Flux linkage of the magnets, peak, in Wb: peak phase voltage of the turning machine without current, divided by its electrical angular speed;
+    /// 0 without magnets.
     #[arg(long, value_name = "WB", value_parser = finite, allow_negative_numbers = true)]
     pub psi_f: f64,
-    /// Share of itself that the larger inductance is left with where the largest current flows along its axis, 0.2 ..= 1; both inductances
-    /// fall with the energy of the current, L = L₀/√(1 + E/E₀) with E = ½ (L_d i_d² + L_q i_q²), and the magnets' flux stays.
+    /// Share of the larger inductance that remains when the largest current flows along its axis, 0.2 ..= 1; both inductances fall with the energy of
+    /// the current, L = L₀/√(1 + E/E₀) with E = ½ (L_d i_d² + L_q i_q²), and the magnets' flux stays.
     #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
     pub saturation: f64,
     /// The limits of machine and inverter.

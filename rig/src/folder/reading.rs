@@ -7,13 +7,13 @@ use clap::{Args, ValueEnum};
 /// The direction of a map's d axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DAxis {
-    /// Along the magnets' flux, or of a machine without magnets along the larger reluctance.
+    /// Along the magnets' flux, or for a machine without magnets along the larger reluctance.
     Magnet,
     /// Along the least reluctance, with the magnets along −q: as SynRM and PMaSynRM are often described.
     Reluctance,
 }
 
-/// The axis from which the angle of a polar map counts.
+/// The axis from which the angle of a polar map is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum AngleFrom {
     /// From q towards −d, as a phase advance.
@@ -28,10 +28,10 @@ pub struct Reading {
     /// Direction of the map's d axis.
     #[arg(long, value_enum, default_value = "magnet")]
     pub d_axis: DAxis,
-    /// The map's axis from which the angle of a current counts that has magnitude and angle.
+    /// The map's axis from which the angle is measured, if currents are given as magnitude and angle.
     #[arg(long, value_enum, default_value = "q")]
     pub angle_from: AngleFrom,
-    /// Quantities that the map counts the other way round.
+    /// Quantities that the map counts with the opposite sign.
     #[arg(long, value_delimiter = ',', value_parser = QUANTITIES, value_name = "QUANTITY,…")]
     pub negate: Vec<String>,
 }

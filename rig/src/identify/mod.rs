@@ -50,13 +50,13 @@ pub struct Identify {
     /// Inertia of the free rotor, in kg·m²; default the folder's.
     #[arg(long, value_name = "KG_M2", value_parser = positive, allow_negative_numbers = true)]
     pub inertia: Option<f64>,
-    /// From this time on a current sensor reads too much, in s: the fault ends the experiment.
+    /// Time from which on a current sensor reads too much, in s: the fault ends the experiment.
     #[arg(long, value_name = "SECONDS", value_parser = not_negative, allow_negative_numbers = true)]
     pub fault_at: Option<f64>,
-    /// Command the drive over the protocol, as a board is: charge, enable, stop, and gather what it has kept, frame by frame.
+    /// Command the drive over the protocol, like a board: charge, enable, stop, and collect its observations, frame by frame.
     #[arg(long)]
     pub over_protocol: bool,
-    /// With --over-protocol: a file for the frames, as candump logs them.
+    /// With --over-protocol: a file for the frames, in candump's log format.
     #[arg(long, value_name = "FILE", requires = "over_protocol")]
     pub frames: Option<PathBuf>,
     /// Identify the machine of a board on this CAN interface, for instance can0; on Linux.
