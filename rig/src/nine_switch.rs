@@ -12,7 +12,7 @@ const COLUMNS: [&str; 6] = ["scheme", "theta1_deg", "m1", "theta2_deg", "m2", "d
 /// Motor 1 is the upper one.
 const ADDED: &str = "feasible,m1_applied,m2_applied";
 
-/// Reads requests, writes them with the gates' levels and toggle instants (T = 1), and the voltages that the motors get.
+/// Reads requests, writes them with the gates' levels and toggle instants (T = 1), and what the motors get.
 pub fn run(input: &Path, output: &Path) -> Result<()> {
     let columns = Columns::read(input, COLUMNS)?;
     let rows = columns.rows().collect::<Vec<_>>();

@@ -72,7 +72,7 @@ pub fn contacts(registers: &Registers, of: &Wires) -> (bool, bool) {
     (closed(of.precharge_contact), closed(of.main_contact))
 }
 
-/// A duty as a compare; a value that is not a number gives none.
+/// A duty as a compare; a value that is not a number gives no duty.
 fn counts(duty: f32) -> u16 {
     let counts = duty * f32::from(CHOPPER_COUNTS);
     if counts >= f32::from(CHOPPER_COUNTS) {

@@ -86,7 +86,7 @@ pub fn toml(name: &str, command: &str, lines: &[(&str, f64, &str)]) -> String {
     text
 }
 
-/// `flux_map.csv` of a map with both signs of iq, after `#` comment lines; the file holds the signs from 0 on.
+/// `flux_map.csv` of a map with both signs of iq, after `#` comment lines; the file holds iq from 0 on.
 pub fn csv(map: &FluxMap, comments: &str) -> String {
     let mut text = format!("{comments}id_a,iq_a,psi_d_wb,psi_q_wb\n");
     let columns = map.iq_a.len();

@@ -70,7 +70,7 @@ fn points_of_a_machine() {
     near(fast.voltage_v, 159.154_943_092, 1e-9);
 }
 
-/// Refused on one side of the highest value that each point allows; the message names that value.
+/// Refused above the highest value that every point allows, accepted below it; the message names that value.
 #[test]
 fn a_limit_is_held_against_each_point() {
     let mut machine = IPM.folder(&[]);

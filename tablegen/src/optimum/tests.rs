@@ -80,8 +80,8 @@ fn least_current_keeps_the_least_id() {
     }
 }
 
-/// Without saturation the torque's curvature over flux linkage comes from the saliency alone: as the product of both axes, it is as positive along as it is
-/// negative across.
+/// Without saturation the torque's curvature over flux linkage comes from the saliency alone: the torque is the product of both axes, so across the
+/// flux linkage it is the negative of that along.
 #[test]
 fn the_curvature_is_the_saliencys() {
     let machine = IPM.folder(&[]);

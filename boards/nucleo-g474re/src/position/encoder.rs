@@ -111,8 +111,8 @@ impl Position for Encoder {
     }
 
     /// Known from the second call after the index on: the flag is read, not captured, so an index between the capture and the reading shows in the
-    /// next count. Called every control period: each further index must find the count that the speed lets it expect; otherwise counts were lost or
-    /// added, and the angle is lost for good.
+    /// next count. Called every control period: each further index must come at a count that the speed makes possible; otherwise counts were lost
+    /// or added, and the angle is lost for good.
     #[inline]
     fn angle(&mut self) -> Option<Angle> {
         let index = self.timer.sr().read().idxif();

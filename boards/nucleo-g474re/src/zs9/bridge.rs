@@ -20,7 +20,7 @@
 //!
 //! * a device is on only while its compares say so, whatever happens: the three devices of a leg conduct together only within the shoot-through that
 //!   is played, and never beyond it;
-//! * if one device of a leg goes off and another one on, all three conduct only after the dead time;
+//! * if one device of a leg goes off and another one on, all conduct the dead time later;
 //! * each shoot-through begins where a device goes on, so it is shorter by the dead time, and vanishes if it is no longer than that. The link's
 //!   control, which has an integral part, compensates for it with its duty;
 //! * a pulse shorter than the dead time is suppressed. A leg that has only such pulses around a valley or a peak conducts through its diodes for at

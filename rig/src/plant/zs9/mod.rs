@@ -31,7 +31,7 @@ use super::{DeviceDrops, PlantSettings, SpeedSource};
 use bridge::Bridge;
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
-/// Least link voltage for which steps are short enough, in V.
+/// Lowest link voltage for which the length of steps is computed, in V.
 const LEAST_LINK_V: f64 = 50.0;
 
 /// The connection of the source to the network.
