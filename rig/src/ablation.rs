@@ -1,4 +1,4 @@
-//! One protection off, to see what it is worth: the campaign must then report the cases that it loses.
+//! One protection switched off, to show its value: the campaign must then report the cases that it loses.
 
 use std::str::FromStr;
 use tractive::machine::{Ratings, Tables};
@@ -11,14 +11,14 @@ pub enum Ablation {
     Check(Fault),
     /// The short circuit as a safe state: always gates off.
     ShortCircuit,
-    /// The drivers' word on the safe state: a leg that is stuck is treated like any other fault.
+    /// The drivers' report about the safe state: a stuck leg is treated like any other fault.
     LegSafeState,
 }
 
 impl Ablation {
     /// Every protection that the campaign tries.
     pub fn all() -> impl Iterator<Item = Self> {
-        /// The rest is found by boards, which have benches of their own.
+        /// The rest is found by boards, which have their own benches.
         const CHECKS: [Fault; 17] = [
             Fault::Overcurrent,
             Fault::DcOvervoltage,
@@ -50,7 +50,7 @@ impl Ablation {
         }
     }
 
-    /// Ratings whose levels are out of reach, where the protection is a level.
+    /// Ratings whose levels are out of reach, if the protection is a level.
     pub fn ratings(self, ratings: &Ratings) -> Ratings {
         let mut changed = *ratings;
         match self {
@@ -80,7 +80,7 @@ impl Ablation {
         Box::leak(Box::new(Tables { ratings: self.ratings(&tables.ratings), ..*tables }))
     }
 
-    /// The checks that the tasks leave out.
+    /// The checks that the tasks omit.
     pub fn masked(self) -> MaskedFaults {
         match self {
             // These are levels: out of reach.

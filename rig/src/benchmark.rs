@@ -1,4 +1,4 @@
-//! `cargo rig bench`: how fast scenarios are simulated on one thread, and where the time goes.
+//! `cargo rig bench`: the speed of the simulation of scenarios on one thread, and where the time goes.
 
 use crate::options::{Options, RunOptions};
 use crate::plant::stopwatch::{self, processor_s};
@@ -26,14 +26,14 @@ pub struct BenchOptions {
 /// The options that every measurement has.
 #[derive(Clone, Debug, Args)]
 struct Common {
-    /// All scenarios unless some are named. Of one system's alone its own options may be named, too.
+    /// All scenarios unless some are named. If all are of one system, its own options may be given, too.
     scenarios: Vec<String>,
     /// The options that all runs share.
     #[command(flatten)]
     run: RunOptions,
 }
 
-/// The systems of the scenarios among words: the PMaSynRM drive, the ZS9.
+/// The systems of the scenarios named in the words: the PMaSynRM drive, the ZS9.
 fn systems(words: &[OsString]) -> [bool; 2] {
     let names = words.iter().filter_map(|word| word.to_str());
     let named = names.filter(|word| catalogue::names().any(|(name, _)| name == *word));
@@ -44,7 +44,7 @@ fn systems(words: &[OsString]) -> [bool; 2] {
 }
 
 impl BenchOptions {
-    /// The command line for scenarios of these systems: of one alone with its own options.
+    /// The command line for scenarios of these systems: for a single one with its own options.
     pub fn command(systems: [bool; 2]) -> Command {
         let command = Common::augment_args(Command::new("bench"));
         let command = match systems {
@@ -55,7 +55,7 @@ impl BenchOptions {
         command.about("Simulated seconds per second of each scenario, on one thread of this machine, and where the time goes")
     }
 
-    /// Reads the words behind `bench`.
+    /// Reads the words after `bench`.
     pub fn read(words: &[OsString]) -> Result<Self> {
         let systems = systems(words);
         let words = std::iter::once(OsString::from("bench")).chain(words.iter().cloned());
@@ -78,15 +78,15 @@ pub struct Measured {
     pub scenario: String,
     /// Recorded time, in s.
     pub simulated_s: f64,
-    /// From the first tick to the last, in s; neither tables nor files are in it.
+    /// Time from the first tick to the last, in s; neither tables nor files are included.
     pub wall_s: f64,
-    /// The processor time of the thread in that time, in s: less than that where other programs want it too.
+    /// The processor time of the thread in that time, in s: less than that if other programs use the processor too.
     pub processor_s: f64,
     /// Simulated seconds in a second of the processor.
     pub ratio: f64,
     /// Steps of the plant's integration.
     pub plant_steps: u64,
-    /// Share of the time that they took, in percent; the rest are the firmware's tasks, the gates, sensors and the trace.
+    /// Share of the time that they took, in percent; the rest is the firmware's tasks, the gates, sensors and the trace.
     pub plant_percent: f64,
 }
 

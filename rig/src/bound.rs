@@ -1,9 +1,8 @@
-//! The bound that pulses and the machine's inductances set: distortion and torque ripple of the modulator's own pattern on the
-//! machine, with no control at all.
+//! The bound set by pulses and the machine's inductances: distortion and torque ripple of the modulator's own pattern on the machine, with no control
+//! at all.
 //!
-//! The pattern's volt-seconds are the stationary flux, exactly; less mean and fundamental they are its ripple. Put around the
-//! mean flux linkage of the operating point and turned into current by the map, they give the least that any control could
-//! reach with these pulses.
+//! The volt-seconds of the pattern are exactly the stationary flux; without mean and fundamental they are its ripple. Added to the mean flux linkage
+//! of the operating point and converted into current by the map, they give the least that any control could reach with these pulses.
 
 use crate::analysis;
 use crate::distortion::{self, Distortion, Samples};
@@ -17,7 +16,7 @@ use serde::Serialize;
 use tractive::modulation::Mode;
 use tractive_tablegen::SmoothMap;
 
-/// A measured distortion beside its bound.
+/// A measured distortion compared with its bound.
 #[derive(Clone, Debug, Serialize)]
 pub struct Beside {
     /// Mechanical speed, in r/min.
@@ -44,7 +43,7 @@ pub struct Beside {
     pub ripple_peak_to_peak_excess_percent: f64,
 }
 
-/// The bound of the operating point that a window of a recording holds.
+/// The bound for the operating point in a window of a recording.
 pub fn beside(
     recording: &Recording,
     window: (f64, f64),
@@ -55,7 +54,7 @@ pub fn beside(
     let last = rows.last()?;
     let measured = distortion::of_recording(recording, window, &machine.folder);
     let bound = Distortion::of(&ideal(rows, options, machine)?);
-    // Of pulses that make no ripple none is no excess.
+    // For pulses without ripple, no ripple is no excess.
     let excess = |value: f64, bound: f64| if value == bound { 0.0 } else { (value / bound - 1.0) * 100.0 };
     Some(Beside {
         speed_rpm: last.speed_rpm,
@@ -80,11 +79,11 @@ const fn cycles(mode: Mode) -> u32 {
     if mode.carriers() == 0 { 20 } else { 1 }
 }
 
-/// The distortion of pulses from which on the current has no fundamental that anything could be a share of, in percent.
+/// The distortion of pulses beyond which the current has no usable fundamental as a reference, in percent.
 const NO_FUNDAMENTAL_PERCENT: f64 = 1000.0;
 
-/// The verdicts on distortion and torque ripple: of an ideal inverter, no more than a little over the bound. Distortion is judged at the points whose
-/// current has a fundamental; where none has, it is told.
+/// The verdicts on distortion and torque ripple: for an ideal inverter, no more than slightly above the bound. Distortion is judged at the points
+/// whose current has a fundamental; if none has, it is only reported.
 pub fn verdicts(points: &[Beside], options: &RunOptions) -> [Verdict; 3] {
     let with_fundamental: Vec<_> =
         points.iter().filter(|point| point.thd_bound_percent < NO_FUNDAMENTAL_PERCENT).collect();
@@ -144,7 +143,7 @@ pub struct Operation {
 }
 
 impl Operation {
-    /// The samples that the mode's own pulses give, none of them shorter than so many µs; nothing where the mode has none for this voltage.
+    /// The samples from the mode's own pulses, none of them shorter than this many µs; `None` if the mode has none for this voltage.
     pub fn samples(&self, min_pulse_us: f64, machine: &Machine) -> Option<Samples> {
         let parameters = &machine.folder.parameters;
         let map = SmoothMap::new(&machine.folder.map);
@@ -169,7 +168,7 @@ impl Operation {
         let mut samples = Samples { angle: Vec::new(), current_a: Vec::new(), torque_nm: Vec::new() };
         let mut current = (id, iq);
         for (alpha, beta, angle) in ripple.points {
-            // The rotor stands behind the voltage by the voltage's angle in its frame.
+            // The rotor lags the voltage by the voltage's angle in its frame.
             let rotor = angle - voltage_angle;
             let (sin, cos) = rotor.sin_cos();
             let (d, q) = (psi_d + alpha * cos + beta * sin, psi_q + beta * cos - alpha * sin);
@@ -219,7 +218,7 @@ impl Ripple {
         let omega = TAU * wanted.f1_hz;
         let mean =
             flux.iter().fold((0.0, 0.0), |sum, value| (sum.0 + value.0 / count, sum.1 + value.1 / count));
-        // The fundamental: what turns forward once a period.
+        // The fundamental: the component that turns forward once a period.
         let (mut cos, mut sin) = (0.0, 0.0);
         for (k, (alpha, beta)) in flux.iter().enumerate() {
             let (s, c) = (omega * k as f64 * dt_s).sin_cos();

@@ -1,4 +1,4 @@
-//! A drive on a CAN bus, commanded in the clock's pace.
+//! A drive on a CAN bus, commanded in real time.
 
 use crate::platform::can::Socket;
 use crate::run::Supervisor;
@@ -7,21 +7,21 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 use tractive::protocol::Frame;
 
-/// Time between two looks at the bus: a slot.
+/// Time between two polls of the bus: a slot.
 const SLOT: Duration = Duration::from_millis(1);
 
-/// A bus that takes and gives frames.
+/// A bus that sends and receives frames.
 pub trait Bus {
     /// Sends a frame.
     fn send(&mut self, frame: &Frame) -> Result<()>;
-    /// The next frame that has come; `None` where there is none now.
+    /// The next received frame; `None` if there is none now.
     fn receive(&mut self) -> Result<Option<Frame>>;
 }
 
-/// Lets a supervisor command whoever is on the bus of an interface of this machine, until it is done.
+/// Lets a supervisor command any drive on the bus of an interface of this computer, until it is done.
 ///
 /// # Errors
-/// Names the interface that cannot be opened; else the bus's own, or the supervisor's.
+/// Names the interface that cannot be opened; otherwise the bus's own, or the supervisor's.
 pub fn command(interface: &str, supervisor: &mut dyn Supervisor) -> Result<()> {
     drive(&mut Socket::open(interface)?, supervisor, 0..u64::MAX)
 }

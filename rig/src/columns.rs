@@ -1,5 +1,5 @@
-//! A CSV from the user: named columns, in any order, `#` comments; what is wrong with it is said in one line with file, line,
-//! column, value and what is allowed.
+//! A CSV from the user: named columns, in any order, `#` comments; an error is reported in one line with file, line, column, value and what is
+//! allowed.
 
 use anyhow::{Context, Result, anyhow};
 use std::path::Path;
@@ -11,7 +11,7 @@ pub struct Columns<const N: usize> {
     rows: Vec<(u64, [String; N])>,
 }
 
-/// One field, and where it stands.
+/// One field, and its position.
 pub struct Field<'a> {
     file: &'a str,
     line: u64,
@@ -59,12 +59,12 @@ impl<const N: usize> Columns<N> {
 }
 
 impl Field<'_> {
-    /// The field as it stands in the file.
+    /// The field as it appears in the file.
     pub const fn text(&self) -> &str {
         self.text
     }
 
-    /// The field as a finite number that is good; otherwise an error that ends with what is allowed.
+    /// The field as a finite number that `good` accepts; otherwise an error that ends with what is allowed.
     pub fn number(&self, allowed: &str, good: impl Fn(f64) -> bool) -> Result<f64> {
         match self.text.parse::<f64>() {
             Ok(value) if value.is_finite() && good(value) => Ok(value),
@@ -75,7 +75,7 @@ impl Field<'_> {
     /// The error for this field.
     pub fn wrong(&self, allowed: &str) -> anyhow::Error {
         let Self { file, line, column, text } = self;
-        // As a literal: whatever the field holds, the error stays one line.
+        // Escaped: whatever the field holds, the error stays one line.
         let text = text.escape_debug();
         anyhow!("{file}:{line}: {column}: {text}: must be {allowed}")
     }

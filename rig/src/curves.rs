@@ -1,4 +1,4 @@
-//! The limits and curves of a machine that the live page draws.
+//! The limits and curves of a machine for the live page.
 
 use crate::machine::Machine;
 use crate::report::unit;
@@ -41,7 +41,7 @@ pub fn properties(machine: &Machine) -> Value {
     })
 }
 
-/// Flux linkages over the plane of currents, d along the rows, both axes with their ends; iq from zero on, being even in it.
+/// Flux linkages over the plane of currents, d along the rows, both axes with their ends; iq from zero on, because of its symmetry.
 fn flux(map: &SmoothMap, largest_a: f64) -> Value {
     const SIDE: u32 = 24;
     let step_a = 1.2 * largest_a / f64::from(SIDE);

@@ -41,7 +41,7 @@ pub fn run(options: &DbcOptions) -> Result<()> {
     }
 }
 
-/// All messages with `true` for those to a drive: one drive's after the other's.
+/// All messages, with `true` for those to a drive: first those of one drive, then those of the other.
 pub fn messages() -> Vec<(&'static Message, bool)> {
     let to = TO_DRIVE.into_iter().chain(TO_ZS9).map(|message| (message, true));
     let from =
@@ -67,7 +67,7 @@ pub fn signals(message: &Message, scales: Scales) -> Vec<Signal> {
     [CRC, COUNTER].into_iter().chain(message.mark_signal(scales)).chain(own).collect()
 }
 
-/// A number of a signal's on a machine's scales.
+/// A signal's number on a machine's scales.
 fn number(value: f32, signal: &Signal, scales: Scales) -> String {
     let exponent = scales.exponent(signal.quantity);
     if value.abs() > 1e9 {
@@ -75,13 +75,13 @@ fn number(value: f32, signal: &Signal, scales: Scales) -> String {
     } else if exponent == 0 {
         value.to_string()
     } else {
-        // As it would be written, not as single precision has it.
+        // The number as it would be written, not as single precision holds it.
         let shown: f64 = format!("{value}e{exponent}").parse().unwrap_or_default();
         shown.to_string()
     }
 }
 
-/// Names of a signal's values, where it has any.
+/// Names of a signal's values, if it has any.
 fn names(signal: &Signal) -> BTreeMap<u32, &'static str> {
     let numbered = |(code, name): (usize, &'static str)| (code as u32, name);
     match signal.name {

@@ -42,8 +42,8 @@ pub struct Harmonic {
 const ORDERS: [u32; 10] = [5, 7, 8, 10, 11, 13, 14, 16, 17, 19];
 
 impl Samples {
-    /// Amplitude of the current's fundamental in A, and the current without it. The fundamental is fitted by least squares: whole
-    /// turns are seldom a whole number of samples, and what a mere projection leaves of it then would count as distortion.
+    /// Amplitude of the current's fundamental in A, and the current without it. The fundamental is fitted by least squares: whole turns are seldom a
+    /// whole number of samples, and the remainder after a mere projection would then count as distortion.
     pub fn without_fundamental(&self) -> (f64, Vec<f64>) {
         let terms = || self.angle.iter().map(|angle| angle.sin_cos()).zip(&self.current_a);
         let (mut ss, mut sc, mut cc, mut s, mut c) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -99,7 +99,7 @@ impl Distortion {
     }
 }
 
-/// Of a window of a recording at constant speed, shortened to whole turns of the stator field.
+/// Made from a window of a recording at constant speed, shortened to whole turns of the stator field.
 pub fn of_recording(
     recording: &Recording,
     (from_s, to_s): (f64, f64),

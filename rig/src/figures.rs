@@ -1,4 +1,4 @@
-//! The paper's figures of the machine and of the modes on a run's page, drawn from our own tables and pulses.
+//! The paper's figures of the machine and of the modes on a run's page, drawn from the project's own tables and pulses.
 
 use crate::analysis::SteadyPoint;
 use crate::machine::Machine;
@@ -8,7 +8,7 @@ use crate::report::Page;
 use crate::trace::Recording;
 use tractive::modulation::{Ladder, Mode};
 
-/// Figures 1, 3, 4, 6, 7 and 10 beside ours.
+/// Figures 1, 3, 4, 6, 7 and 10 next to the project's own.
 pub fn draw(page: &mut Page, recording: &Recording, points: &[SteadyPoint], machine: &Machine) {
     let rated_nm = machine.folder.parameters.rated_torque_nm;
     page.picture("figure 10", "torque accuracy, efficiency, current", runs::accuracy(points, rated_nm));

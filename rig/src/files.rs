@@ -15,7 +15,7 @@ pub enum Cell {
     Number(f32),
     /// A number in double precision.
     Exact(f64),
-    /// A number as it is written down.
+    /// A number in its written form.
     Written(String),
     /// A name.
     Name(&'static str),
@@ -36,7 +36,7 @@ impl Cell {
         Self::Written(value.to_string())
     }
 
-    /// A number rounded to one of so many parts, so that it prints short.
+    /// A number rounded to a multiple of one over `parts`, so that it prints short.
     pub fn short(value: f64, parts: f64) -> Self {
         Self::Written(((value * parts).round() / parts).to_string())
     }
@@ -61,7 +61,7 @@ cells! {
     Option<f64>: value => value.map_or(Self::Missing, Self::from);
 }
 
-/// Columns by their names with what is in them.
+/// Columns by their names, with their contents.
 #[macro_export]
 macro_rules! columns {
     ($($name:ident: $value:expr),* $(,)?) => {
@@ -82,7 +82,7 @@ impl<const N: usize> Serialize for Columns<N> {
     }
 }
 
-/// Writes rows under the names of their columns; of no rows nothing.
+/// Writes rows under the names of their columns; for no rows nothing.
 pub fn write_rows(path: &Path, rows: impl IntoIterator<Item = impl Serialize>) -> Result<()> {
     write_whole(path, |out| Ok(rows.into_iter().try_for_each(|row| out.serialize(row))?))
 }
@@ -94,7 +94,7 @@ pub fn bytes_of_rows(rows: impl IntoIterator<Item = impl Serialize>) -> Result<V
     Ok(out.into_inner().map_err(csv::IntoInnerError::into_error)?)
 }
 
-/// Writes edges.csv: when, which gate, on or off.
+/// Writes edges.csv: time, gate, on or off.
 pub fn write_edges(path: &Path, edges: impl Iterator<Item = (Cell, &'static str, bool)>) -> Result<()> {
     let mut rows = edges
         .map(|(t_s, gate, on)| Columns([("t_s", t_s), ("gate", gate.into()), ("level", on.into())]))
@@ -105,7 +105,7 @@ pub fn write_edges(path: &Path, edges: impl Iterator<Item = (Cell, &'static str,
     }
 }
 
-/// Writes what a fault has frozen in the flight recorder; else takes away what an earlier run has left.
+/// Writes what a fault has frozen in the flight recorder; otherwise removes what an earlier run has left.
 pub fn write_recorder<R, const N: usize>(
     path: &Path,
     recorded: &[R],
@@ -114,7 +114,7 @@ pub fn write_recorder<R, const N: usize>(
     if recorded.is_empty() { forget(path) } else { write_rows(path, recorded.iter().map(row)) }
 }
 
-/// Takes away a file that an earlier run has left.
+/// Removes a file that an earlier run has left.
 pub fn forget(path: &Path) -> Result<()> {
     match std::fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -136,7 +136,7 @@ pub fn write_whole(
     })
 }
 
-/// Refuses an `--out` where a file is in the way of a folder.
+/// Refuses an `--out` if a file is in the way of a folder.
 pub fn check_folder(out: &Path) -> Result<()> {
     let in_the_way = out.ancestors().find(|path| path.exists() && !path.is_dir());
     in_the_way.map_or(Ok(()), |file| {
@@ -144,7 +144,7 @@ pub fn check_folder(out: &Path) -> Result<()> {
     })
 }
 
-/// Makes the folder of `--out`, where it is not there yet.
+/// Creates the folder of `--out` if it does not exist yet.
 pub fn make_folder(out: &Path) -> Result<()> {
     check_folder(out)?;
     std::fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))

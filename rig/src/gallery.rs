@@ -29,7 +29,7 @@ pub struct FigureOptions {
     /// Print the pictures' names and what they show, and draw none.
     #[arg(long)]
     pub list: bool,
-    /// Write these beside each SVG, by rsvg-convert (Debian: librsvg2-bin).
+    /// Write these next to each SVG, by rsvg-convert (Debian: librsvg2-bin).
     #[arg(long, value_enum, value_name = "FORMAT", num_args = 1.., value_delimiter = ',')]
     pub also: Vec<Format>,
     /// Pixels of a PNG for one of the SVG.
@@ -61,7 +61,7 @@ impl Format {
     fn convert(self, svg: &Path, zoom: f64) -> Result<()> {
         let mut convert = Command::new("rsvg-convert");
         convert.args(["--format", self.name(), "--keep-aspect-ratio", "--background-color", "white"]);
-        // Of vectors a zoom would only change the size on paper.
+        // For vectors a zoom would only change the size on paper.
         if self == Self::Png {
             convert.args(["--zoom", &zoom.to_string()]);
         }
@@ -85,7 +85,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// The scenario with its options, where there is a run.
+    /// The scenario with its options, if there is a run.
     pub const fn scenario(&self) -> Option<&'static str> {
         match self {
             Self::Drawn(_) => None,
@@ -111,10 +111,9 @@ impl Machines {
 
 /// A picture: name, what it shows, and its maker.
 pub struct Picture {
-    /// Paper and number, `chai-9`; of a group that the paper's text speaks of its first and last, `zs9-24-35`. Without a paper where it is
-    /// in none.
+    /// Paper and number, `chai-9`; for a group that the paper's text refers to, its first and last, `zs9-24-35`. Without a paper if it is in none.
     pub name: &'static str,
-    /// The words for it in a list.
+    /// Its description in a list.
     pub what: &'static str,
     /// The maker.
     pub source: Source,
@@ -125,14 +124,14 @@ impl Picture {
         Self { name, what, source }
     }
 
-    /// The paper with the first and the last of its figures; nothing where it is in none.
+    /// The paper with the first and the last of its figures; `None` if it is in none.
     pub fn figures(&self) -> Option<(&'static str, u32, u32)> {
         let (paper, numbers) = self.name.split_once('-')?;
         let (first, last) = numbers.split_once('-').unwrap_or((numbers, numbers));
         Some((paper, first.parse().ok()?, last.parse().ok()?))
     }
 
-    /// `true` if a word of `--only` means it.
+    /// `true` if a word of `--only` refers to it.
     fn is_meant(&self, word: &str) -> bool {
         let within = |(paper, first, last): (&str, u32, u32)| {
             word == paper || (first..=last).any(|number| word == format!("{paper}-{number}"))
@@ -224,7 +223,7 @@ fn accuracy(recording: &Recording, machine: &Machine) -> Result<String> {
     chai::runs::accuracy(&points, machine.folder.parameters.rated_torque_nm)
 }
 
-/// The pictures that the words mean; all where there is none. The error names a word that means none.
+/// The pictures that the words refer to; all if there are no words. The error names a word that refers to none.
 fn chosen(only: &[String]) -> Result<Vec<&'static Picture>> {
     for word in only {
         let known = PICTURES.iter().any(|picture| picture.is_meant(word));
@@ -284,7 +283,7 @@ pub fn drawn() -> Result<Vec<(&'static Picture, String)>> {
     Ok(all.into_iter().flatten().collect())
 }
 
-/// Writes the pictures that are asked for.
+/// Writes the requested pictures.
 pub fn run(options: &FigureOptions) -> Result<()> {
     let pictures = chosen(&options.only)?;
     if options.list {
@@ -310,7 +309,7 @@ pub fn run(options: &FigureOptions) -> Result<()> {
     })
 }
 
-/// Says what was drawn, or with `--list` what there is.
+/// Prints what was drawn, or with `--list` what is available.
 fn tell(
     options: &FigureOptions,
     pictures: &[&Picture],

@@ -1,8 +1,7 @@
-//! The rig: plays the motor to the drive, on the host and in QEMU, and shows what happened.
+//! The rig: acts as the motor for the drive, on the host and in QEMU, and shows what happened.
 //!
-//! [`machine`] turns any machine folder into a plant and into the tables that the firmware's own code runs on;
-//! [`mod@bench`] puts plant, inverter and sensors into the timers' time; [`run`] connects a drive to it; [`scenario`] says what
-//! is driven and what is to be seen; [`report`] draws it.
+//! [`machine`] turns any machine folder into a plant and into the tables that the firmware's own code runs on; [`mod@bench`] puts plant, inverter and
+//! sensors into the timers' time; [`run`] connects a drive to it; [`scenario`] defines what is driven and what is to be seen; [`report`] draws it.
 #![forbid(unsafe_code)]
 
 pub mod ablation;

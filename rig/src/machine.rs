@@ -12,7 +12,7 @@ use tractive_tablegen::MachineFolder;
 pub struct Machine {
     /// The folder that was read.
     pub folder: MachineFolder,
-    /// The tables that the firmware's code runs on; made once, kept for the program's life.
+    /// The tables that the firmware's code runs on; made once, kept for the program's lifetime.
     pub tables: &'static Tables,
 }
 
@@ -33,7 +33,7 @@ impl Machine {
         Ok(machine)
     }
 
-    /// The machine of a folder, with tables made of it.
+    /// The machine of a folder, with tables made from it.
     pub fn of(folder: MachineFolder) -> Self {
         let tables = Box::leak(Box::new(folder.tables()));
         Self { folder, tables }
@@ -45,13 +45,13 @@ impl Machine {
             let (own, other) = (&self.folder, &named.folder);
             own.parameters == other.parameters && own.map == other.map
         };
-        // A browser has no files; its papers' machines are those that are built in.
+        // A browser has no files; there the papers' machines are the built-in ones.
         let built_in = [&built_in::traction::BUILT_IN, &built_in::zs9::BUILT_IN];
         let papers = cfg!(not(unix)) && built_in.iter().any(|tables| std::ptr::eq(*tables, self.tables));
         self.tables.name == name && (papers || Self::load(name).is_ok_and(|named| same(&named)))
     }
 
-    /// Largest torque at a mechanical speed in r/min, in N·m: the machine's largest, or what its largest power leaves.
+    /// Largest torque at a mechanical speed in r/min, in N·m: the machine's largest, or what its largest power allows.
     pub fn envelope_nm(&self, speed_rpm: f64) -> f64 {
         let parameters = &self.folder.parameters;
         let omega = speed_rpm.abs() * core::f64::consts::TAU / 60.0;
@@ -74,7 +74,7 @@ impl Source {
         Self { folder, files }
     }
 
-    /// The tables that `tractive` was built with, if these are the files that they were made of: to make them takes a quarter of a second.
+    /// The tables that `tractive` was built with, if they were made from these files: making them takes a quarter of a second.
     fn built_in(&self) -> Option<&'static Tables> {
         let tables: [&'static Tables; 2] = [&built_in::traction::BUILT_IN, &built_in::zs9::BUILT_IN];
         let same =

@@ -61,7 +61,7 @@ enum Command {
         #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<OsString>,
     },
-    /// Serves the live page of a drive that is elsewhere: the image in QEMU, or a drive on a CAN bus.
+    /// Serves the live page of a drive that runs elsewhere: the image in QEMU, or a drive on a CAN bus.
     #[cfg(unix)]
     #[command(disable_help_flag = true, override_usage = "tractive-rig live [OPTIONS]")]
     Live {
@@ -81,27 +81,26 @@ enum Command {
         #[arg(long, value_name = "K/N")]
         shard: Option<Shard>,
     },
-    /// The whole of a campaign or of a sweep over operating points whose shards are all in a folder: the files that one run would have
-    /// written.
+    /// Merges a campaign or a sweep over operating points whose shards are all in a folder: writes the files that one run would have written.
     Merge(MergeOptions),
     /// Machine folders: from nameplate values, from a map of another tool, and as a page.
     #[command(subcommand)]
     Machine(Box<MachineCommand>),
-    /// An unknown machine, simulated, identified by its own drive: its resistance, its flux map, its inertia, and a machine folder of them.
+    /// Identifies an unknown machine, simulated, by its own drive: its resistance, its flux map, its inertia, and a machine folder made from them.
     Identify(Box<identify::Identify>),
-    /// An unknown machine brought to its first torque, step by step: wiring, identification, tables, a little torque; and a record of it.
+    /// Brings an unknown machine to its first torque, step by step: wiring, identification, tables, a little torque; and writes a record of it.
     Commission(Box<commission::Commission>),
     /// The protocol's description for CAN tools, a DBC file: signals in the steps that follow from a machine's ratings.
     Dbc(DbcOptions),
     /// The modulator's pulses in steady state.
     Pattern(PatternOptions),
-    /// Optimises the pulse patterns anew: each branch's window and weighted distortion.
+    /// Recomputes the optimised pulse patterns: each branch's window and weighted distortion.
     Patterns(optimised::PatternsOptions),
-    /// Faults in every mode, at every speed, motoring, braking and coasting, and what came of each.
+    /// Faults in every mode, at every speed, motoring, braking and coasting, and the outcome of each.
     Campaign(CampaignOptions),
     /// The papers' figures as this project makes them, an SVG each, named by paper and number.
     Figures(gallery::FigureOptions),
-    /// Both control laws in the same runs, the project's own and the ordinary one: what each reached.
+    /// Both control laws in the same runs, the project's own and the ordinary one: the results of each.
     Compare(CompareOptions),
     /// The nine-switch modulator's gates for one carrier period (T = 1): IN.csv has scheme,theta1_deg,m1,theta2_deg,m2,d_sh;
     /// OUT.csv adds for each gate UH ... WL its level just after t = 0 (X_init) and its toggle instants (X_edges, with ; between),
@@ -136,7 +135,7 @@ fn main() -> ExitCode {
             if let Some(usage) = error.downcast_ref::<clap::Error>() {
                 usage.exit();
             }
-            // One line: what was wrong, and where.
+            // One line: the error, and its place.
             eprintln!("{error:#}");
             ExitCode::from(2)
         }
@@ -190,7 +189,7 @@ fn command(command: Command) -> Result<ExitCode> {
     }
 }
 
-/// Says what is needed for the words, without doing anything.
+/// Prints what is needed for the words, without doing anything.
 fn needs(words: Vec<OsString>) -> Result<ExitCode> {
     let needs = match Cli::try_parse_from(std::iter::once("tractive-rig".into()).chain(words))?.command {
         Command::Run { words } => Needs::of_run(words)?,

@@ -23,7 +23,7 @@ pub struct MergeOptions {
     pub json: bool,
 }
 
-/// Merges. Exit code 1 where the whole campaign would have had it; an error where something is missing, there twice, or of another campaign.
+/// Merges. Exit code 1 if the whole campaign would have had it; an error if something is missing, occurs twice, or belongs to another campaign.
 pub fn run(options: &MergeOptions) -> Result<ExitCode> {
     let merged = shards::merge(&options.folders)?;
     let out = &options.out;

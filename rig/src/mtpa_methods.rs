@@ -1,5 +1,5 @@
-//! The paper's MTPA beside ours, judged on the smooth flux map. The paper does not say with which inductances its first pass begins: those
-//! of zero current are our reading.
+//! The paper's MTPA compared with the project's own, judged on the smooth flux map. The paper does not say with which inductances its first pass
+//! begins: those at zero current are our reading.
 
 use crate::machine::Machine;
 use crate::verdict::{Verdict, worst};
@@ -15,7 +15,7 @@ pub struct MethodFigures {
     pub method: &'static str,
     /// Torque wanted, in N·m.
     pub torque_nm: f64,
-    /// Torque delivered less that, in percent.
+    /// Torque delivered minus that, in percent.
     pub torque_error_percent: f64,
     /// Current above the least that gives the delivered torque, in percent.
     pub excess_current_percent: f64,
@@ -25,14 +25,14 @@ pub struct MethodFigures {
 pub const OURS: &str = "the same, trimmed: ours";
 /// The plain reading of the paper: `--law pi --mtpa-start zero`.
 pub const ZERO: &str = "two passes from L(0, 0), as we read the paper";
-/// The point at which the passes no longer move: `--law pi`.
+/// The point at which the passes no longer change: `--law pi`.
 pub const PREVIOUS: &str = "two passes from the point before, again and again";
 /// More passes than the fixed point needs.
 const MANY: usize = 60;
 /// Its bounds: torque off, and current above the least, in percent.
 const BOUNDS: (f64, f64) = (0.3, 0.05);
 
-/// The worst of every method; ours is judged, the others are reported.
+/// The worst value of every method; ours is judged, the others are reported.
 pub fn verdicts(figures: &[MethodFigures]) -> Vec<Verdict> {
     let methods = figures.iter().map(|one| one.method).take(figures.len() / SHARES.len());
     let of = |method: &'static str| {
@@ -52,7 +52,7 @@ pub fn verdicts(figures: &[MethodFigures]) -> Vec<Verdict> {
 /// Torques as shares of the largest: 200, 600, 859 and 1,235 N·m of the reference machine.
 const SHARES: [f64; 4] = [200.0 / 1235.0, 600.0 / 1235.0, 859.0 / 1235.0, 1.0];
 
-/// One pass and two passes from zero current, two passes as our tables start them, and the same as they trim them.
+/// One pass and two passes from zero current, two passes from the start in our tables, and the same with their trim.
 pub fn compare(machine: &Machine) -> Vec<MethodFigures> {
     let tables = machine.tables;
     let map = SmoothMap::new(&machine.folder.map);

@@ -1,4 +1,4 @@
-//! The needs of a run, for whoever builds images and sets up the emulator.
+//! The needs of a run, for the program that builds images and sets up the emulator.
 
 use crate::commission::Commission;
 use crate::identify::Identify;
@@ -26,13 +26,13 @@ pub struct Needs {
     pub on: On,
     /// The machine that was named.
     pub machine: Option<String>,
-    /// `true` if the image is still to be built.
+    /// `true` if the image still has to be built.
     pub image: bool,
-    /// `true` if the emulator is still to be found.
+    /// `true` if the emulator still has to be found.
     pub emulator: bool,
     /// The script of a talk that was named.
     pub script: Option<PathBuf>,
-    /// The machine folder that a commissioning makes, where the drive's image with its tables is still to be built then.
+    /// The machine folder that a commissioning makes, if the drive's image with its tables then still has to be built.
     pub tables: Option<PathBuf>,
 }
 
@@ -52,7 +52,7 @@ impl Needs {
         }
     }
 
-    /// Of the words behind `run`.
+    /// Made from the words after `run`.
     pub fn of_run(words: Vec<OsString>) -> Result<Self> {
         Ok(match catalogue::choose(words)? {
             Chosen::Traction(choice) => {
@@ -63,24 +63,24 @@ impl Needs {
         })
     }
 
-    /// Of an identification.
+    /// Made for an identification.
     pub fn of_identify(identify: &Identify) -> Self {
         Self { law: "identification", ..Self::of(Traction::NAME, &identify.options.run) }
     }
 
-    /// Of a commissioning.
+    /// Made for a commissioning.
     pub fn of_commission(commission: &Commission) -> Self {
         let options = &commission.identify.options;
         let drives = options.on == On::Qemu && commission.until.is_none() && commission.drive_image.is_none();
         Self { tables: options.out.clone().filter(|_| drives), ..Self::of_identify(&commission.identify) }
     }
 
-    /// Of a talk.
+    /// Made for a talk.
     pub fn of_talk(options: &TalkOptions) -> Self {
         Self { script: options.script.clone(), ..Self::of_drive(&options.drive) }
     }
 
-    /// Of a drive that is talked to.
+    /// Made for a drive that is talked to.
     pub fn of_drive(options: &DriveOptions) -> Self {
         let system = match options.system {
             talk::System::Pmasynrm => Traction::NAME,

@@ -12,7 +12,7 @@ const COLUMNS: [&str; 6] = ["scheme", "theta1_deg", "m1", "theta2_deg", "m2", "d
 /// Motor 1 is the upper one.
 const ADDED: &str = "feasible,m1_applied,m2_applied";
 
-/// Reads requests, writes them with the gates' levels and toggle instants (T = 1), and what the motors have.
+/// Reads requests, writes them with the gates' levels and toggle instants (T = 1), and what the motors get.
 pub fn run(input: &Path, output: &Path) -> Result<()> {
     let columns = Columns::read(input, COLUMNS)?;
     let rows = columns.rows().collect::<Vec<_>>();
@@ -44,7 +44,7 @@ fn period(fields: &[Field; 6]) -> Result<Period> {
         lower: MotorVoltage { angle: angle(theta2)?, modulation_index: number(m2, INDEX)? },
         shoot_through: number(d_sh, DUTY)?,
     };
-    // What is out of its range is for the modulator to say.
+    // Values out of range are left for the modulator to report.
     step(&request).map_err(|refused| match refused {
         Refused::UpperIndex => m1.wrong(INDEX),
         Refused::LowerIndex => m2.wrong(INDEX),
@@ -64,7 +64,7 @@ fn number(field: &Field, allowed: &str) -> Result<f32> {
     Ok(field.number(allowed, |_| true)? as f32)
 }
 
-/// Any number of turns, in double precision until it is a fraction of one.
+/// Any number of turns, in double precision until it is reduced to a fraction of one.
 fn angle(field: &Field) -> Result<Angle> {
     let turns = field.number("a finite number", |_| true)? / 360.0;
     Ok(Angle((turns.rem_euclid(1.0) * 4_294_967_296.0).round() as u64 as u32))

@@ -17,7 +17,7 @@ pub struct PatternsOptions {
     points: bool,
 }
 
-/// Operating points of the reference machine that both are measured at: speed in r/min, torque in N·m.
+/// Operating points of the reference machine at which both are measured: speed in r/min, torque in N·m.
 const POINTS: [(f64, f64); 9] = [
     (700.0, 1235.0),
     (1000.0, 1235.0),
@@ -30,18 +30,18 @@ const POINTS: [(f64, f64); 9] = [
     (2700.0, 871.4),
 ];
 
-/// One point as it was driven.
+/// One point as driven.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// Mode at its end.
     pub mode: String,
     /// Distortion of the current, in percent.
     pub thd_percent: f64,
-    /// By how much it exceeds what the mode's own pulses give, in percent of that.
+    /// Excess over the distortion of the mode's own pulses, in percent of that.
     pub thd_excess_percent: f64,
     /// Torque, peak to peak, in N·m.
     pub ripple_nm: f64,
-    /// By how much it exceeds what the mode's own pulses give, in percent of that.
+    /// Excess over the ripple of the mode's own pulses, in percent of that.
     pub ripple_excess_percent: f64,
     /// Phase current, in A, rms.
     pub current_a: f64,
@@ -52,7 +52,7 @@ pub struct Point {
 /// Drives a point to its steady state on the host.
 ///
 /// # Errors
-/// As the scenario's; or no figures came of it.
+/// As the scenario's; or that it gave no figures.
 pub fn measured(speed_rpm: f64, torque_nm: f64, patterns: &str) -> Result<Point> {
     let line = format!("steady --speed {speed_rpm} --torque {torque_nm} --patterns {patterns} --on host");
     let chosen = catalogue::of_traction(&line)?;
@@ -77,7 +77,7 @@ pub fn measured(speed_rpm: f64, torque_nm: f64, patterns: &str) -> Result<Point>
     })
 }
 
-/// Makes the patterns, prints a line for each branch, and writes the angles if asked to.
+/// Makes the patterns, prints a line for each branch, and writes the angles if requested.
 pub fn run(options: &PatternsOptions) -> Result<()> {
     let branches = follow_all().map_err(|problem| anyhow!(problem))?;
     say!("branch   pulses  modulation index: weighted distortion in %");
@@ -107,7 +107,7 @@ pub fn run(options: &PatternsOptions) -> Result<()> {
     }
 }
 
-/// First node, last node, and those between at every tenth of six-step.
+/// First node, last node, and the nodes between at every tenth of six-step.
 fn line(followed: &Followed) -> String {
     let branch = &followed.branch;
     let last = followed.nodes.len().saturating_sub(1);

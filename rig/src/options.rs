@@ -45,7 +45,7 @@ impl FromStr for Ripple {
     }
 }
 
-/// A number that is good; the error says what is allowed.
+/// A number that `good` accepts; the error says what is allowed.
 pub fn number(text: &str, allowed: &str, good: impl Fn(f64) -> bool) -> Result<f64, String> {
     let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && good(*value));
     value.ok_or_else(|| format!("must be {allowed}"))
@@ -86,7 +86,7 @@ pub struct RunOptions {
     /// A folder of tables/, or the path of any machine folder; default the system's own.
     #[arg(long)]
     pub machine: Option<String>,
-    /// Step of trace.csv, in s; default what the scenario needs.
+    /// Step of trace.csv, in s; default as the scenario needs.
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub dt: Option<f64>,
     /// Seed of the noise.
@@ -102,7 +102,7 @@ pub struct RunOptions {
     /// Dead time, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     pub dead_time_us: f64,
-    /// Shortest pulse, in µs; default 10, or of a machine whose devices switch faster than 900 Hz the same share of a carrier.
+    /// Shortest pulse, in µs; default 10, or, for a machine whose devices switch faster than 900 Hz, the same share of a carrier.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     pub min_pulse_us: Option<f64>,
     /// Resolution of the current converters, in bits.
@@ -114,10 +114,10 @@ pub struct RunOptions {
     /// DC-link ripple, V@HZ.
     #[arg(long)]
     pub udc_ripple: Option<Ripple>,
-    /// By how much the machine's true flux exceeds the map, in percent.
+    /// Excess of the machine's true flux over the map, in percent.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
     pub map_error: f64,
-    /// By how much the machine's true stator resistance exceeds the rating, in percent.
+    /// Excess of the machine's true stator resistance over the rating, in percent.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
     pub rs_error: f64,
     /// Error of the angle sensor, electrical, in degrees.
@@ -165,7 +165,7 @@ impl<O: Args> std::ops::Deref for Options<O> {
 /// Shortest pulse unless the options say another, in µs, of devices that switch up to 900 Hz.
 pub const USUAL_MIN_PULSE_US: f64 = 10.0;
 
-/// The same of devices of any highest switching frequency, in Hz: at most the same share of a carrier.
+/// The same for devices of any highest switching frequency, in Hz: at most the same share of a carrier.
 pub fn usual_min_pulse_us(max_switching_hz: f64) -> f64 {
     USUAL_MIN_PULSE_US * (900.0 / max_switching_hz).min(1.0)
 }
@@ -182,19 +182,18 @@ pub fn within(ranges: &[(&str, f64, f64, f64)]) -> anyhow::Result<()> {
 }
 
 impl RunOptions {
-    /// Shortest pulse, in µs, of devices of this highest switching frequency, in Hz.
+    /// Shortest pulse, in µs, for devices of this highest switching frequency, in Hz.
     pub fn min_pulse_us(&self, max_switching_hz: f64) -> f64 {
         self.min_pulse_us.unwrap_or_else(|| usual_min_pulse_us(max_switching_hz))
     }
 
-    /// `true` if inverter, sensors and machine are as control believes them to be.
+    /// `true` if inverter, sensors and machine are as control assumes.
     pub fn is_ideal(&self) -> bool {
         let flaws = [self.dead_time_us, self.noise_a, self.map_error, self.rs_error, self.angle_error];
         flaws.iter().all(|flaw| *flaw == 0.0) && self.adc_bits.is_none() && self.udc_ripple.is_none()
     }
 
-    /// The check that the flaws make sense with this machine and source, of either system. The error names the first option that
-    /// is out of its range.
+    /// Checks that the flaws make sense with this machine and source, of either system. The error names the first option that is out of its range.
     pub fn check_flaws(&self, machine: &Machine, source_v: f64) -> anyhow::Result<()> {
         let ripple = self.udc_ripple.unwrap_or(Ripple { amplitude_v: 0.0, frequency_hz: 1.0 });
         within(&[
@@ -207,7 +206,7 @@ impl RunOptions {
         ])
     }
 
-    /// The emulator with the image that was handed over; a patient one waits for as long as somebody types.
+    /// The emulator with the given image; a patient one waits for as long as somebody types.
     pub fn emulator(&self, patient: bool) -> anyhow::Result<Emulator> {
         let Some(image) = self.image.clone() else {
             anyhow::bail!("--on qemu needs --image; `cargo xtask run` builds it and hands it over");
@@ -221,10 +220,10 @@ impl RunOptions {
         })
     }
 
-    /// The place where it runs, and the law. In a page both are as they are usual: what else there is would double its size.
+    /// The place where it runs, and the law. In a page both have their usual values: anything else would double its size.
     ///
     /// # Errors
-    /// Says what a page does not have.
+    /// Says what a page does not include.
     pub fn choice(&self) -> anyhow::Result<(On, LawName)> {
         if !cfg!(target_family = "wasm") {
             return Ok((self.on, self.law));
@@ -247,7 +246,7 @@ impl RunOptions {
         }
     }
 
-    /// The sensors' imperfections; the converters' range is the trip level and a quarter more.
+    /// The sensors' imperfections; the converters' range is the trip level plus a quarter.
     pub fn flaws(&self, trip_current_a: f64) -> Flaws {
         Flaws {
             adc_bits: self.adc_bits,

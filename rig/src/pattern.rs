@@ -18,7 +18,7 @@ pub struct Wanted {
     /// Mode.
     #[arg(skip)]
     pub mode: Mode,
-    /// Fundamental, peak phase, in V; that of square wave is 2/π of the link, whatever is said.
+    /// Fundamental, peak phase, in V; in square wave it is 2/π of the link, whatever is given.
     #[arg(long = "u", id = "u", value_parser = not_negative, allow_negative_numbers = true)]
     pub voltage_v: f64,
     /// DC link, in V.
@@ -41,7 +41,7 @@ pub struct Wanted {
     pub max_switching_hz: f32,
 }
 
-/// The names of the modes with pulses; `opp7` stands for that of its branches which is played at the modulation index.
+/// The names of the modes with pulses; `opp7` stands for the one of its branches that is used at the modulation index.
 pub fn names() -> PossibleValuesParser {
     let pulsing = Mode::ALL.into_iter().filter(|mode| *mode != Mode::Off);
     let mut names: Vec<_> = pulsing.flat_map(|mode| [mode.family(), mode.name()]).collect();
@@ -64,10 +64,10 @@ pub type LegEdge = (f64, usize, bool);
 /// Longest pattern, in s.
 const LONGEST_S: f64 = 100.0;
 
-/// Highest stator frequency, in Hz: far beyond what any mode is for.
+/// Highest stator frequency, in Hz: far beyond the range of any mode.
 const HIGHEST_HZ: f64 = 5_000.0;
 
-/// The upper devices' changes over whole fundamental periods, and at their beginning their levels.
+/// The upper devices' changes over whole fundamental periods, and their levels at the beginning.
 pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
     let tick_s = f64::from(CLOCK.ticks_per_s).recip();
     let ticks = |microseconds: f64| (microseconds * 1e-6 / tick_s).round() as u32;
@@ -94,7 +94,7 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
     }
     let mut modulator = Modulator::new(devices, Schedule::fixed(wanted.mode, &CLOCK));
     let cycle = (1.0 / (wanted.f1_hz * tick_s)).round() as u64;
-    // One fundamental to lock on, then from the next zero of the pulse angle.
+    // One fundamental period to lock on, then from the next zero of the pulse angle.
     let (begin, end) = (2 * cycle, (2 + u64::from(wanted.cycles)) * cycle);
     let mut inverter: Option<Inverter> = None;
     let mut start = 0_u64;
@@ -127,7 +127,7 @@ fn reference(wanted: &Wanted, rate: f32, tick: u64) -> Reference {
     let turned = (f64::from(rate) * tick as f64).rem_euclid(4_294_967_296.0);
     let angle = Angle(turned as u64 as u32) - Angle::DEG_90;
     let udc_v = wanted.udc_v as f32;
-    // A whole mode gives what the link has; asked for less, it would have notches, as after a jump of the link.
+    // A whole mode gives the link's full voltage; with a smaller request it would have notches, as after a jump of the link.
     let voltage_v = if wanted.mode.is_whole() { six_step_v(udc_v) } else { wanted.voltage_v as f32 };
     Reference::turning(voltage_v, angle, rate, Instant(tick as u32), udc_v)
 }

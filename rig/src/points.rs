@@ -1,4 +1,4 @@
-//! `cargo rig points`: operating points by the firmware's own code.
+//! `cargo rig points`: operating points computed by the firmware's own code.
 
 use crate::columns::Columns;
 use crate::files;
@@ -18,13 +18,13 @@ struct Wanted {
     udc_v: f64,
 }
 
-/// Current or voltage over its limit up to which that counts as kept: what interpolation adds beyond the largest speed is below.
+/// Ratio of current or voltage to its limit up to which that counts as kept: the effect of interpolation beyond the largest speed is smaller.
 const KEPT: f32 = 1.05;
 
 /// The name of a sweep in shards.
 pub const POINTS: &str = "points";
 
-/// Reads points, writes points with `id_a,iq_a,region`; of a shard its own ones, into a folder.
+/// Reads points, writes points with `id_a,iq_a,region`; for a shard only its own, into a folder.
 pub fn run(input: &Path, output: &Path, machine: &Machine, shard: Option<Shard>) -> Result<()> {
     let wanted = read(input, machine)?;
     let columns = format!("{},id_a,iq_a,region", COLUMNS.join(","));
@@ -42,7 +42,7 @@ pub fn run(input: &Path, output: &Path, machine: &Machine, shard: Option<Shard>)
     files::write_text(output, &format!("{columns}\n{}", lines.concat()))
 }
 
-/// Writes the points of shards that are merged.
+/// Writes the points of merged shards.
 pub fn merged(merged: &Merged, out: &Path) -> Result<()> {
     files::write_text(&out.join("points.csv"), &merged.csv())
 }
@@ -58,7 +58,7 @@ impl Wanted {
         operating_point(self.torque_nm as f32, self.omega(machine), &limit, machine.tables)
     }
 
-    /// `true` if what is found keeps both limits: at some speed, of some link, no current within the largest one does.
+    /// `true` if the result keeps both limits: at some speed, with some link, no current within the largest one does.
     fn is_kept(&self, machine: &Machine) -> bool {
         let (current, omega) = (self.found(machine).current, self.omega(machine));
         let flux = flux_linkage(machine.tables, current);

@@ -1,4 +1,4 @@
-//! Rows of a trace, whichever drive's.
+//! Rows of a trace, of either drive.
 
 /// Something with a time.
 pub trait Timed {
@@ -13,7 +13,7 @@ pub fn between<R: Timed>(rows: &[R], from_s: f64, to_s: f64) -> &[R] {
     &rows[first..last.max(first)]
 }
 
-/// Mean over rows; 0 of none.
+/// Mean over rows; 0 for none.
 pub fn mean<R>(rows: &[R], value: impl Fn(&R) -> f64) -> f64 {
     rows.iter().map(value).sum::<f64>() / rows.len().max(1) as f64
 }

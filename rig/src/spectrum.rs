@@ -1,4 +1,4 @@
-//! The current's spectrum in steady state beside that of the bound.
+//! The current's spectrum in steady state next to that of the bound.
 
 use crate::distortion::{self, Samples};
 use crate::machine::Machine;
@@ -10,11 +10,11 @@ use core::f64::consts::TAU;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-/// Highest frequency that is drawn, over `max_switching_hz`: a little above three times it, 3 kHz of 900 Hz.
+/// Highest frequency that is drawn, over `max_switching_hz`: slightly more than three times it, 3 kHz for 900 Hz.
 const HIGHEST: f64 = 10.0 / 3.0;
 /// Smallest line that is drawn, in percent of the fundamental.
 const SMALLEST_PERCENT: f64 = 0.02;
-/// By how much the bound's lines stand beside the measured ones, as a share of the highest frequency.
+/// Offset of the bound's lines from the measured ones, as a share of the highest frequency.
 const BESIDE: f64 = 8.0 / 3_000.0;
 
 /// Half the foot of a line, as a share of the highest frequency: a curve has one value at a frequency.
@@ -44,7 +44,7 @@ pub fn draw(
     page.curves(&heading, "frequency in Hz", "% of the fundamental", &series);
 }
 
-/// A spectrum as lines that stand on the axis, so many Hz beside their place, up to a frequency in Hz.
+/// A spectrum as lines that stand on the axis, offset by this many Hz, up to a frequency in Hz.
 fn lines(samples: &Samples, f1_hz: f64, (beside_hz, highest_hz): (f64, f64)) -> Vec<(f64, f64)> {
     let (fundamental_a, rest) = samples.without_fundamental();
     let count = rest.len();

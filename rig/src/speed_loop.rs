@@ -1,15 +1,15 @@
-//! The vehicle's speed loop: a torque that brings the measured speed to a reference which moves smoothly.
+//! The vehicle's speed loop: a torque that brings the measured speed to a smoothly moving reference.
 
 use core::f64::consts::TAU;
 
-/// Bandwidth, in rad/s: the telemetry brings a speed every 10 ms.
+/// Bandwidth, in rad/s: the telemetry gives a speed every 10 ms.
 const BANDWIDTH_RAD_S: f64 = 6.0;
 /// Corner of the integral part, as a share of it.
 const INTEGRAL_SHARE: f64 = 0.4;
 
-/// Time in which the reference takes up its slope, in s: the drive's torque is limited in its rate, too.
+/// Time in which the reference reaches its slope, in s: the drive's torque is limited in its rate, too.
 const TAKE_UP_S: f64 = 0.3;
-/// The rate at which the reference lands on its target, in 1/s.
+/// The rate at which the reference approaches its target, in 1/s.
 const LANDING_1_S: f64 = 4.0;
 
 /// Holds a speed.
@@ -26,7 +26,7 @@ pub struct SpeedLoop {
 }
 
 impl SpeedLoop {
-    /// From the present speed and torque on.
+    /// Starts from the present speed and torque.
     pub fn new(inertia_kg_m2: f64, largest_nm: f64, speed_rpm: f64, torque_nm: f64) -> Self {
         Self {
             inertia_kg_m2,
@@ -39,7 +39,7 @@ impl SpeedLoop {
         }
     }
 
-    /// A new target, and how fast the reference goes there, in r/min per second.
+    /// Sets a new target, and the slope with which the reference goes there, in r/min per second.
     pub fn aim(&mut self, target_rpm: f64, slope_rpm_s: f64) {
         (self.target_rpm, self.largest_rpm_s) = (target_rpm, slope_rpm_s);
     }
@@ -56,7 +56,7 @@ impl SpeedLoop {
         let gain = self.inertia_kg_m2 * BANDWIDTH_RAD_S;
         let wanted = self.inertia_kg_m2 * acceleration_rad_s2 + gain * error_rad_s + self.integral_nm;
         let torque_nm = wanted.clamp(-self.largest_nm, self.largest_nm);
-        // Nothing is summed up while the torque cannot follow.
+        // The integral stops while the torque cannot follow.
         if torque_nm == wanted {
             self.integral_nm += INTEGRAL_SHARE * BANDWIDTH_RAD_S * gain * error_rad_s * dt_s;
         }

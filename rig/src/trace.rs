@@ -1,4 +1,4 @@
-//! The files that a run leaves behind: trace, edges, switches of mode. Files are written whole or not at all.
+//! The files of a run: trace, edges, mode changes. Files are written whole or not at all.
 
 use crate::columns;
 use crate::files::{Cell, Columns, bytes_of_rows, write_edges, write_recorder, write_rows};
@@ -13,7 +13,7 @@ use tractive::operator::Status;
 use tractive::protection::Trip;
 use tractive::recorder::Record;
 
-/// Ticks since the run's beginning; on a bench that counts finer, its steps.
+/// Ticks since the run's beginning; on a bench with a finer count, its steps.
 pub type Tick = u64;
 
 /// A gate edge: device 0 ..= 5 is uh ul vh vl wh wl.
@@ -39,12 +39,12 @@ pub struct SlotRow {
     pub status: Status,
 }
 
-/// The angle of a start without one, as the drive has found it, or the index, whose error is none.
+/// The angle found by the drive after a start without one; or the index, whose error is zero.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
     /// The time from the recording's beginning, in s.
     pub t_s: f64,
-    /// By how much it is ahead of the true one, electrical, in degrees, −180 ..= 180.
+    /// Lead over the true one, electrical, in degrees, −180 ..= 180.
     pub error_deg: f64,
 }
 
@@ -81,22 +81,22 @@ pub struct Row {
     pub line_a: Option<f64>,
     /// Stator frequency as control knows it, in Hz.
     pub f1_hz: f64,
-    /// Control's estimate of how much the machine's flux linkage exceeds the map's, as a share.
+    /// Control's estimate of the excess of the machine's flux linkage over the map's, as a share.
     pub map_error: f64,
-    /// The torque that control says flows, smoothed, in N·m.
+    /// The actual torque according to control, smoothed, in N·m.
     pub flowing_nm: f64,
     /// Mode of the running carrier.
     pub mode: Mode,
     /// The latched fault.
     pub trip: Option<Trip>,
-    /// The operator's last word, if there is one.
+    /// The operator's last status, if there is one.
     pub status: Option<Status>,
     /// Extremes since the row before.
     pub extremes: Extremes,
 }
 
-/// The extremes of the plant since the last row that is judged: at each edge of a gate, where phase currents and torque have their corners, and
-/// at the row. Between two of these, which are a trace step apart at most, a phase current bends by less than 0.1 %.
+/// The extremes of the plant since the last row that is judged: at each gate edge, where phase currents and torque have their corners, and at the
+/// row. Between two of these, which are at most a trace step apart, a phase current bends by less than 0.1 %.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Extremes {
     /// Largest |phase current|, in A.
@@ -110,7 +110,7 @@ pub struct Extremes {
 }
 
 impl Extremes {
-    /// Before anything is seen.
+    /// Initial value.
     pub const NONE: Self = Self {
         current_a: 0.0,
         lowest_nm: f64::INFINITY,
@@ -118,7 +118,7 @@ impl Extremes {
         lowest_id_a: f64::INFINITY,
     };
 
-    /// With one more instant's phase currents, torque and i_d.
+    /// Includes one more instant's phase currents, torque and i_d.
     pub fn with(self, currents_a: [f64; 3], torque_nm: f64, id_a: f64) -> Self {
         Self {
             current_a: currents_a.into_iter().fold(self.current_a, |most, current| most.max(current.abs())),
@@ -151,14 +151,14 @@ pub struct Switch {
     pub from: Mode,
     /// The mode that began.
     pub to: Mode,
-    /// Pulse angle of the switch, in degrees; `None` where the old carrier was not locked.
+    /// Pulse angle of the switch, in degrees; `None` if the old carrier was not locked.
     pub pulse_angle_deg: Option<f64>,
     /// Mechanical speed, in r/min.
     pub speed_rpm: f64,
 }
 
 impl Switch {
-    /// `true` if both modes make pulses, and it is within the recording.
+    /// `true` if both modes make pulses, and the change is within the recording.
     pub fn is_between_pulses(&self) -> bool {
         self.t_s > 0.0 && self.from != Mode::Off && self.to != Mode::Off
     }
@@ -167,11 +167,11 @@ impl Switch {
 /// The balance of a link's energy.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkBalance {
-    /// By who gave or took it.
+    /// Energies by source and sink.
     pub energies: LinkEnergies,
-    /// All that was moved, of either sign, in J.
+    /// All energy that was moved, of either sign, in J.
     pub moved_j: f64,
-    /// Neither given nor kept: what integration has lost, in J.
+    /// Energy that was neither given nor stored: the error of the integration, in J.
     pub missing_j: f64,
 }
 
@@ -179,7 +179,7 @@ pub struct LinkBalance {
 pub struct Recording {
     /// Rows of the trace, at the step at which they are judged.
     pub rows: Vec<Row>,
-    /// Rows of trace.csv, where it has another step.
+    /// Rows of trace.csv, if it has another step.
     pub written: Option<Vec<Row>>,
     /// Changes of mode.
     pub switches: Vec<Switch>,
@@ -195,9 +195,9 @@ pub struct Recording {
     pub tick_s: f64,
     /// The records of the drive's flight recorder, with their times in s from the recording's beginning; empty without a fault.
     pub recorded: Vec<(f64, Record)>,
-    /// The observations of an identification; empty of any other run.
+    /// The observations of an identification; empty for any other run.
     pub observations: Vec<Observation>,
-    /// The angle that the drive has found, where it started without one.
+    /// The angle found by the drive, if it started without one.
     pub found: Option<Found>,
     /// The recordings of the other drives on the same link.
     pub beside: Vec<Recording>,
@@ -214,7 +214,7 @@ impl Recording {
         (tick as f64 - self.lead as f64) * self.tick_s
     }
 
-    /// Line voltage between phases u and v in V over time in s, from the gates' edges from a time to another.
+    /// Line voltage between phases u and v in V over time in s, from the gates' edges between two times.
     pub fn line_voltage(&self, (from_s, to_s): (f64, f64)) -> Vec<(f64, f64)> {
         let udc_v = self.rows.first().map_or(0.0, |row| row.udc_v);
         let mut on = [false; GATES.len()];
@@ -291,9 +291,9 @@ pub trait Recorded {
     fn lowest_id_a(&self) -> f64;
     /// Writes trace.csv.
     fn write_trace(&self, path: &Path) -> Result<()>;
-    /// Writes recorder.csv, if a fault has frozen the flight recorder; else takes away what an earlier run has left.
+    /// Writes recorder.csv, if a fault has frozen the flight recorder; otherwise removes what an earlier run has left.
     fn write_recorder(&self, path: &Path) -> Result<()>;
-    /// Writes what else there is into a folder: edges.csv, operator.csv.
+    /// Writes the remaining files into a folder: edges.csv, operator.csv.
     fn write_events(&self, folder: &Path) -> Result<()>;
 }
 
@@ -319,7 +319,7 @@ impl Recorded for Recording {
         write_recorder(path, &self.recorded, recorder_columns)
     }
 
-    /// Edges within the recording; of the operator's slots those in which its words differ from those before.
+    /// Writes the edges within the recording, and the operator's slots whose status differs from the previous one.
     fn write_events(&self, folder: &Path) -> Result<()> {
         let edges = self.edges.iter().filter(|edge| edge.tick >= self.lead);
         let edge =

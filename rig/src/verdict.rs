@@ -1,28 +1,28 @@
-//! Figures beside what is wanted of them.
+//! Figures compared with their required values.
 
 use crate::options::RunOptions;
 use serde::Serialize;
 
-/// The words of a verdict where the bound is not kept.
+/// The words of a verdict if the bound is violated.
 pub const FALLS_SHORT: &str = "falls short";
-/// The words of a verdict where the run held nothing of the kind: that is no pass.
+/// The words of a verdict if the run contained nothing of the kind: that does not count as a pass.
 pub const NOT_SEEN: &str = "not seen";
 
-/// A figure, its bound, and whether it is kept.
+/// A figure, its bound, and the verdict.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
     /// The quantity that is judged, with its unit.
     pub what: String,
-    /// Found; nothing where the run held nothing of the kind.
+    /// The value found; `None` if the run contained nothing of the kind.
     pub found: Option<f64>,
-    /// Wanted at most; nothing where the figure is only reported.
+    /// The upper bound; `None` if the figure is only reported.
     pub at_most: Option<f64>,
     /// `pass`, `falls short`, `reported` or `not seen`.
     pub verdict: &'static str,
 }
 
 impl Verdict {
-    /// Judges a figure that should be at most so large; with an infinite bound it is reported. What is no number falls short.
+    /// Judges a figure against an upper bound; with an infinite bound it is only reported. A value that is not a number falls short.
     pub fn at_most(what: &str, found: impl Into<Option<f64>>, at_most: f64) -> Self {
         let (found, at_most) = (found.into(), at_most.is_finite().then_some(at_most));
         let verdict = match (found, at_most) {
@@ -34,19 +34,19 @@ impl Verdict {
         Self { what: what.to_owned(), found, at_most, verdict }
     }
 
-    /// The same of a figure that has to come: where the run held nothing of the kind, it falls short.
+    /// The same for a figure that must occur: if the run contained nothing of the kind, it falls short.
     pub fn wanted(self) -> Self {
         let verdict = if self.verdict == NOT_SEEN { FALLS_SHORT } else { self.verdict };
         Self { verdict, ..self }
     }
 
-    /// Something that must not be, as 0 or 1.
+    /// Something that must not occur, as 0 or 1.
     pub fn never(what: &str, is: bool) -> Self {
         Self::at_most(what, f64::from(u8::from(is)), 0.0)
     }
 }
 
-/// The largest of some values; nothing of none, and no number where one of them is none.
+/// The largest of some values; `None` if there are none, and not a number if one of them is not.
 pub fn worst(values: impl Iterator<Item = f64>) -> Option<f64> {
     values.reduce(|worst, value| if worst.is_nan() || worst > value { worst } else { value })
 }
@@ -56,7 +56,7 @@ pub fn bound(options: &RunOptions, ideal: f64, with_flaws: f64) -> f64 {
     if options.is_ideal() { ideal } else { with_flaws }
 }
 
-/// A bound on the mean torque's error. An angle or a map that is wrong makes torque wrong: there it is only reported.
+/// A bound on the mean torque's error. A wrong angle or a wrong map makes the torque wrong: in that case it is only reported.
 pub fn torque_bound(options: &RunOptions, ideal: f64, with_flaws: f64) -> f64 {
     let misled = options.angle_error != 0.0 || options.map_error != 0.0;
     if misled { f64::INFINITY } else { bound(options, ideal, with_flaws) }

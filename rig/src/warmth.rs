@@ -1,11 +1,11 @@
-//! A traction machine's and its inverter's warmth, as the rig plays it and the drive knows it.
+//! Temperatures of a traction machine and its inverter, in the rig's simulation and in the drive's model.
 
 use crate::plant::{HeatSettings, Node};
 use tractive::thermal::{Derating, DeviceLosses, Element, Magnets, Rise, Sensor, Thermal};
 
 /// The sensor in the winding.
 pub const PT1000: Sensor = Sensor { element: Element::Pt1000, series_ohm: 1e3, range_c: [-40.0, 220.0] };
-/// The one on the heat sink.
+/// The sensor on the heat sink.
 pub const NTC: Sensor = Sensor {
     element: Element::Ntc { at_25_ohm: 10e3, beta_k: 3_435.0 },
     series_ohm: 4.7e3,
@@ -29,7 +29,7 @@ pub const THERMAL: Thermal = Thermal {
     magnets: Some(Magnets { per_k: -1e-3, map_c: 20.0, derating: Derating { from_c: 150.0, none_c: 180.0 } }),
 };
 
-/// Both as they are, at 20 °C to begin with.
+/// The true values of both, at 20 °C to begin with.
 pub const HEAT: HeatSettings = HeatSettings {
     coolant_c: 20.0,
     hottest: Node { j_per_k: 60.0 / 5e-3, k_per_w: 5e-3 },

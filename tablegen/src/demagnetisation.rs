@@ -1,4 +1,4 @@
-//! The demagnetisation limit, and the operating points that a machine keeps in spite of it.
+//! The demagnetisation limit, and the operating points that a machine must still reach with it.
 
 use crate::weakening::at_id;
 use crate::{InputError, MachineFolder, Optimum, Parameters, SmoothMap};
@@ -6,14 +6,14 @@ use libm::hypot;
 use std::f64::consts::{FRAC_2_PI, TAU};
 use std::path::Path;
 
-/// Values of i_d that are tried, from none to the largest current.
+/// Number of i_d values that are tried, from zero to the largest current.
 const STEPS: usize = 400;
-/// Bisections between two of them.
+/// Bisections between two of these values.
 const HALVINGS: u32 = 40;
 
-/// An operating point that the limit must leave.
+/// An operating point that the limit must allow.
 struct Point {
-    /// The keys that ask for it.
+    /// The keys that require it.
     what: &'static str,
     /// Torque, in N·m.
     torque_nm: f64,
@@ -23,7 +23,7 @@ struct Point {
     voltage_v: f64,
 }
 
-/// The largest torque at standstill; the rated point on the nominal link, and no torque at the largest speed on the lowest one, in six-step.
+/// The largest torque at standstill; the rated point at the nominal link voltage, and no torque at the largest speed at the lowest one, in six-step.
 fn points(parameters: &Parameters) -> [Point; 3] {
     let omega = |speed_rpm: f64| speed_rpm * TAU / 60.0 * f64::from(parameters.pole_pairs);
     [
@@ -48,10 +48,10 @@ fn points(parameters: &Parameters) -> [Point; 3] {
     ]
 }
 
-/// The check of a limit that is given: it must leave every point that the largest current alone allows.
+/// Checks a given limit: it must allow every point that the largest current alone allows.
 ///
 /// # Errors
-/// Names the key, its value, the highest one allowed and what asks for it.
+/// Names the key, its value, the highest value allowed and what requires it.
 pub(crate) fn check(machine: &MachineFolder, file: &Path) -> Result<(), InputError> {
     let parameters = &machine.parameters;
     if parameters.least_id_a().is_infinite() {
@@ -73,7 +73,7 @@ pub(crate) fn check(machine: &MachineFolder, file: &Path) -> Result<(), InputErr
     Ok(())
 }
 
-/// The highest i_d up to 0 at which there is a current for a point, in A; `None` where the largest current does not give it.
+/// The highest i_d, up to 0, at which a current gives the point, in A; `None` if the largest current does not reach it.
 fn highest_id_a(point: &Point, map: &SmoothMap, parameters: &Parameters) -> Option<f64> {
     let most_a = parameters.max_current_a;
     let optimum = Optimum::of(map, parameters.pole_pairs, most_a);

@@ -1,4 +1,4 @@
-//! The error of a machine folder, in one line.
+//! The error of a machine folder, printed in one line.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -10,21 +10,21 @@ use std::path::{Path, PathBuf};
 pub struct InputError {
     /// The file.
     pub file: PathBuf,
-    /// The line, from 1, where there is one.
+    /// The line, from 1, if there is one.
     pub line: Option<u64>,
     /// Field, value and what is allowed.
     pub problem: String,
 }
 
 impl InputError {
-    /// A problem in a file, on one line whatever a parser's message looks like; and the number of its line, if it has one.
+    /// A problem in a file, on one line whatever a parser's message looks like; and its line number, if it has one.
     pub fn new(file: &Path, line: Option<u64>, problem: impl Into<String>) -> Self {
         let problem = problem.into().split_whitespace().collect::<Vec<_>>().join(" ");
         Self { file: file.to_owned(), line, problem }
     }
 }
 
-/// The same line: a build script whose `main` ends with it shows it so.
+/// Prints the same line: a build script whose `main` returns the error then shows it.
 impl fmt::Debug for InputError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, formatter)

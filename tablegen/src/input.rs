@@ -1,4 +1,4 @@
-//! Files of a machine folder, read whole but never without end.
+//! Files of a machine folder, read whole but with a size limit.
 
 use std::io::{Error, Read, Result};
 use std::path::Path;
@@ -9,9 +9,9 @@ const LARGEST_BYTES: u64 = 16 << 20;
 /// Bytes of a regular file.
 ///
 /// # Errors
-/// Where it cannot be read, is a device, a pipe or a folder, or is longer than 16 MiB.
+/// If it cannot be read, is a device, a pipe or a folder, or is longer than 16 MiB.
 pub fn read_bounded(file: &Path) -> Result<Vec<u8>> {
-    // Before it is opened: opening a pipe waits for its writer.
+    // Checked before it is opened: opening a pipe waits for its writer.
     if !std::fs::metadata(file)?.is_file() {
         return Err(Error::other("must be a regular file"));
     }

@@ -1,7 +1,7 @@
 //! Iron loss, as a torque that brakes the rotor.
 //!
-//! `T = T_rated (ψ/ψ_rated)² (f n/n_rated + (1 − f) sign n)`: hysteresis loses the same in every turn, eddy currents the more the faster it is, both by the
-//! square of the flux linkage. The currents know nothing of it.
+//! `T = T_rated (ψ/ψ_rated)² (f n/n_rated + (1 − f) sign n)`: the hysteresis loss is the same in every turn, the eddy-current loss per turn grows with
+//! speed, and both grow with the square of the flux linkage. The currents are not affected.
 
 use crate::{FluxMap, Optimum, Parameters, SmoothMap};
 use tractive_control::machine::IronLoss;
@@ -19,11 +19,11 @@ pub struct Iron {
 }
 
 impl Iron {
-    /// Without loss.
+    /// No loss.
     pub const NONE: Self = Self { hysteresis: 0.0, eddy: 0.0 };
 
-    /// The iron of a machine, which has this share of the loss that its folder names, at rated speed and rated torque. The part that grows with the square
-    /// of speed is eddy currents.
+    /// The iron of a machine that causes this share of the loss named in its folder, at rated speed and rated torque. The part that grows with the square
+    /// of speed is attributed to eddy currents.
     pub fn of(parameters: &Parameters, map: &FluxMap, share: f64) -> Self {
         if share == 0.0 {
             return Self::NONE;
@@ -38,18 +38,18 @@ impl Iron {
         }
     }
 
-    /// `true` if it loses anything.
+    /// `true` if there is any loss.
     #[inline]
     pub fn is_some(&self) -> bool {
         *self != Self::NONE
     }
 
-    /// As a drive knows it.
+    /// The loss in the form that a drive knows it.
     pub fn known(&self) -> IronLoss {
         IronLoss { hysteresis: self.hysteresis as f32, eddy: self.eddy as f32 }
     }
 
-    /// The torque against the rotor, positive forward, in N·m, at the square of the flux linkage, in Wb², and an electrical speed, in rad/s.
+    /// The torque against the rotor, positive forward, in N·m, for the square of the flux linkage, in Wb², and an electrical speed, in rad/s.
     pub fn torque_nm(&self, square: f64, omega: f64) -> f64 {
         square * (self.hysteresis * (omega / LEAST_RAD_S).clamp(-1.0, 1.0) + self.eddy * omega)
     }

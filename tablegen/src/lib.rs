@@ -1,4 +1,4 @@
-//! Reads a machine folder, refuses what is wrong, and makes the tables that `tractive` runs on.
+//! Reads a machine folder, rejects invalid input, and makes the tables that `tractive` runs on.
 //!
 //! A build script writes the tables out as Rust:
 //!
@@ -9,8 +9,8 @@
 //! # }
 //! ```
 //!
-//! and the firmware takes them in with `mod machine { include!(concat!(env!("OUT_DIR"), "/machine.rs")); }`. A program on a host
-//! makes them at run time, with [`MachineFolder::tables`].
+//! and the firmware includes them with `mod machine { include!(concat!(env!("OUT_DIR"), "/machine.rs")); }`. A program on a host makes them at run
+//! time, with [`MachineFolder::tables`].
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 #![forbid(unsafe_code)]
 
@@ -43,11 +43,11 @@ pub use parameters::{Parameters, Patterns, TWO_LEVEL_SHARE};
 pub use rust_source::rust_source;
 pub use smooth::{FluxPoint, SmoothMap};
 
-/// Reads and checks the machine `folder`, writes its tables as Rust into `file`, and has cargo build them anew when the folder changes.
-/// For build scripts; `types` is as in [`rust_source`].
+/// Reads and checks the machine `folder`, writes its tables as Rust into `file`, and makes cargo rebuild them when the folder changes. For build
+/// scripts; `types` is as in [`rust_source`].
 ///
 /// # Errors
-/// As [`MachineFolder::read`], or why the file could not be written.
+/// As [`MachineFolder::read`], or the reason why the file could not be written.
 pub fn build(folder: impl AsRef<Path>, file: impl AsRef<Path>, types: &str) -> Result<(), InputError> {
     let (folder, file) = (folder.as_ref(), file.as_ref());
     println!("cargo:rerun-if-changed={}", folder.display());
@@ -75,7 +75,7 @@ impl MachineFolder {
         Self { parameters: Parameters::read(&files[0])?, map: FluxMap::read(&files[1])? }.checked(&files)
     }
 
-    /// The same of the two files' texts: for a program that has no file system.
+    /// The same from the text of the two files: for a program that has no file system.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -86,7 +86,7 @@ impl MachineFolder {
         Self { parameters, map }.checked(&files)
     }
 
-    /// Parameters and map must fit each other.
+    /// Checks that parameters and map fit each other.
     fn checked(self, [machine_toml, flux_map_csv]: &[PathBuf; 2]) -> Result<Self, InputError> {
         self.map.check_range(self.parameters.max_current_a, flux_map_csv)?;
         demagnetisation::check(&self, machine_toml)?;
@@ -94,7 +94,7 @@ impl MachineFolder {
         Ok(self)
     }
 
-    /// The largest torque must be within reach of the largest current, and its best point on the map.
+    /// Checks that the largest torque is within reach of the largest current, and that its best point is on the map.
     fn check_torque(&self, file: &Path) -> Result<(), InputError> {
         let parameters = &self.parameters;
         let smooth = SmoothMap::new(&self.map);

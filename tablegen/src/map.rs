@@ -1,4 +1,4 @@
-//! `flux_map.csv`: the nodes of the flux map, and what a flux map must be.
+//! `flux_map.csv`: the nodes of the flux map, and the requirements on a flux map.
 
 use crate::InputError;
 use std::cmp::Ordering;
@@ -21,11 +21,11 @@ const COLUMNS: [&str; 4] = ["id_a", "iq_a", "psi_d_wb", "psi_q_wb"];
 /// Largest current and flux linkage of any machine that this controller could drive.
 const LARGEST_CURRENT_A: f64 = 1e5;
 const LARGEST_FLUX_WB: f64 = 1e3;
-/// Deviation from an even grid that is rounding, as a share of the step.
+/// Deviation from an even grid that still counts as rounding, as a share of the step.
 const STEP_TOLERANCE: f64 = 1e-3;
-/// Deviation from ψd even, ψq odd in iq that is measurement, as a share of the largest flux.
+/// Deviation from ψd even, ψq odd in iq that still counts as measurement error, as a share of the largest flux.
 const SYMMETRY_TOLERANCE: f64 = 0.01;
-/// Deviation between ∂ψd/∂iq and ∂ψq/∂id that is measurement, as a share of the largest self inductance.
+/// Deviation between ∂ψd/∂iq and ∂ψq/∂id that still counts as measurement error, as a share of the largest self inductance.
 const RECIPROCITY_TOLERANCE: f64 = 0.05;
 
 /// A line of the file.
@@ -39,7 +39,7 @@ struct Node {
 }
 
 impl Node {
-    /// The order of two in the grid, iq running faster.
+    /// The order of two nodes in the grid, iq running faster.
     fn place(&self, other: &Self) -> Ordering {
         self.id.total_cmp(&other.id).then(self.iq.total_cmp(&other.iq))
     }
@@ -55,7 +55,7 @@ impl FluxMap {
         Self::parse(&crate::read_bounded(file).map_err(refuse)?, file)
     }
 
-    /// The same of a text that is there; errors name `file`.
+    /// The same from a given text; errors name `file`.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -74,7 +74,7 @@ impl FluxMap {
         Ok(map)
     }
 
-    /// The grid must cover currents up to `max_current_a`.
+    /// Checks that the grid covers currents up to `max_current_a`.
     ///
     /// # Errors
     /// Names the axis that ends too early.
@@ -121,7 +121,7 @@ fn read_nodes(text: &[u8], file: &Path) -> Result<Vec<Node>, InputError> {
         for ((value, field), column) in values.iter_mut().zip(&record).zip(COLUMNS) {
             let largest = if column.ends_with("_a") { LARGEST_CURRENT_A } else { LARGEST_FLUX_WB };
             *value = match field.parse::<f64>() {
-                // There is one zero.
+                // Adding zero turns −0 into 0.
                 Ok(number) if number.is_finite() && number.abs() <= largest => number + 0.0,
                 Ok(number) if number.is_finite() => {
                     let problem = format!("{column}: {field}: must be from {} to {largest}", -largest);
@@ -136,8 +136,8 @@ fn read_nodes(text: &[u8], file: &Path) -> Result<Vec<Node>, InputError> {
     Ok(nodes)
 }
 
-/// The line of the record that the reader begins to look for at a position: it counts from before the comments and empty
-/// lines that it skips.
+/// The line of the record for which the reader starts looking at a position: the reader counts from before the comments and empty lines that it
+/// skips.
 pub fn line_of(text: &[u8], position: &csv::Position) -> u64 {
     let rest = text.get(position.byte() as usize..).unwrap_or_default();
     let skipped = |line: &&[u8]| line.first().is_none_or(|first| *first == b'#' || *first == b'\r');
@@ -158,7 +158,7 @@ fn axes(nodes: &[Node], file: &Path) -> Result<(Vec<f64>, Vec<f64>), InputError>
         let mean = (values[last].0 - values[0].0) / last as f64;
         let off = |k: usize, step: f64| (values[k].0 - values[0].0 - step * k as f64).abs();
         if (0..=last).any(|k| off(k, mean) > STEP_TOLERANCE * mean) {
-            // The first that leaves the first step is the one to look at.
+            // The first step that deviates from the first one is the one to report.
             let step = values[1].0 - values[0].0;
             let odd = (2..=last).find(|k| off(*k, step) > STEP_TOLERANCE * step).unwrap_or(last);
             let (found, line) = values[odd];
@@ -176,7 +176,7 @@ fn axes(nodes: &[Node], file: &Path) -> Result<(Vec<f64>, Vec<f64>), InputError>
     Ok((id, iq))
 }
 
-/// Every node once; they come in the grid's order, iq running faster, and were `sorted` so in the file or not.
+/// Checks that every node occurs once; they come in the grid's order, iq running faster, whether they were `sorted` so in the file or not.
 fn check_grid(nodes: &[Node], id: &[f64], iq: &[f64], sorted: bool, file: &Path) -> Result<(), InputError> {
     if let Some(twins) = nodes.windows(2).find(|pair| pair[0].place(&pair[1]).is_eq()) {
         let (Node { id, iq, line, .. }, earlier) = (twins[1], twins[0].line);
@@ -201,7 +201,7 @@ fn check_grid(nodes: &[Node], id: &[f64], iq: &[f64], sorted: bool, file: &Path)
     }
 }
 
-/// Flux rises with its own current.
+/// Checks that flux rises with its own current.
 fn check_monotone(nodes: &[Node], columns: usize, file: &Path) -> Result<(), InputError> {
     for (k, node) in nodes.iter().enumerate() {
         let neighbours = [
@@ -231,7 +231,7 @@ fn largest(nodes: &[Node]) -> f64 {
     nodes.iter().map(|node| node.psi_d.abs().max(node.psi_q.abs())).fold(0.0, f64::max)
 }
 
-/// ψd even and ψq odd in iq, within the tolerance; then made so exactly.
+/// Checks that ψd is even and ψq odd in iq, within the tolerance; then makes them exactly so.
 fn check_even(nodes: &[Node], iq: &[f64], file: &Path) -> Result<FluxMap, InputError> {
     let columns = iq.len();
     let span = iq[columns - 1] + iq[0];
@@ -260,7 +260,7 @@ fn check_even(nodes: &[Node], iq: &[f64], file: &Path) -> Result<FluxMap, InputE
     Ok(FluxMap { id_a: Vec::new(), iq_a: iq.to_vec(), psi_d_wb, psi_q_wb })
 }
 
-/// Both signs of iq from one: ψd even, ψq odd, which is 0 at iq = 0.
+/// Makes both signs of iq from one: ψd even, ψq odd, which is 0 at iq = 0.
 fn mirror(nodes: &[Node], iq: &[f64], file: &Path) -> Result<FluxMap, InputError> {
     let tolerance = SYMMETRY_TOLERANCE * largest(nodes);
     let (mut psi_d_wb, mut psi_q_wb) = (Vec::new(), Vec::new());
@@ -318,8 +318,7 @@ impl FluxMap {
         })
     }
 
-    /// ∂ψd/∂iq = ∂ψq/∂id: a machine stores energy and gives it back. With the means over a cell this says that ψ does
-    /// not circulate around it.
+    /// Checks ∂ψd/∂iq = ∂ψq/∂id: a machine stores energy and returns it. With the means over a cell this says that ψ does not circulate around it.
     fn check_reciprocity(&self, nodes: &[Node], file: &Path) -> Result<(), InputError> {
         let self_h = self.cells().map(|cell| cell.ldd.max(cell.lqq)).fold(0.0, f64::max);
         let tolerance = RECIPROCITY_TOLERANCE * self_h;
@@ -338,7 +337,7 @@ impl FluxMap {
         }
     }
 
-    /// Ldd Lqq > Ldq Lqd: one current for one flux linkage.
+    /// Checks Ldd Lqq > Ldq Lqd: exactly one current for each flux linkage.
     fn check_invertible(&self, nodes: &[Node], file: &Path) -> Result<(), InputError> {
         match self.cells().find(|cell| cell.ldd * cell.lqq <= cell.ldq * cell.lqd) {
             Some(cell) => Err(InputError::new(

@@ -17,13 +17,13 @@ const SECTIONS: u32 = 60;
 const HALVINGS: u32 = 80;
 
 impl<'a> Optimum<'a> {
-    /// For a machine.
+    /// Made for a machine.
     pub fn new(map: &'a SmoothMap, parameters: &Parameters) -> Self {
         let whole = Self::of(map, parameters.pole_pairs, parameters.max_current_a);
         Self { least_id_a: parameters.least_id_a(), ..whole }
     }
 
-    /// For a map of so many pole pairs, within a largest current in A, peak, whatever i_d.
+    /// Made for a map with so many pole pairs, within a largest current in A, peak, with any i_d.
     pub fn of(map: &'a SmoothMap, pole_pairs: u32, max_current_a: f64) -> Self {
         Self { map, factor: 1.5 * f64::from(pole_pairs), max_current_a, least_id_a: f64::NEG_INFINITY }
     }
@@ -34,8 +34,8 @@ impl<'a> Optimum<'a> {
         self.factor * (at.psi_d_wb * iq_a - at.psi_q_wb * id_a)
     }
 
-    /// The excess of mean torque over a flux ripple beyond the torque at a current, in N·m/Wb², over the ripple's mean square along the flux linkage and
-    /// across it; taken over `ripple_wb` either way. Zero where there is no flux linkage, or none of the map's currents has that ripple's.
+    /// The excess of the mean torque over a flux ripple above the torque at a current, in N·m/Wb², per mean square of the ripple along the flux linkage and
+    /// across it; computed over `ripple_wb` either way. Zero if there is no flux linkage, or if no current of the map has the flux linkage with that ripple.
     pub fn curvature(&self, (id_a, iq_a): (f64, f64), ripple_wb: f64) -> [f64; 2] {
         let at = self.map.at(id_a, iq_a);
         let size_wb = hypot(at.psi_d_wb, at.psi_q_wb);
@@ -51,16 +51,16 @@ impl<'a> Optimum<'a> {
         })
     }
 
-    /// The most torque of a current magnitude, and its angle from the q axis towards −d, in rad.
+    /// The largest torque of a current magnitude, and its angle from the q axis towards −d, in rad.
     fn at_magnitude(&self, current_a: f64) -> (f64, f64) {
         let torque = |angle: f64| self.torque_nm(-current_a * sin(angle), current_a * cos(angle));
-        // The optimum lies on the other side of the q axis for a machine with L_d > L_q.
+        // For a machine with L_d > L_q the optimum lies on the other side of the q axis.
         let most_rad = asin((-self.least_id_a / current_a).min(1.0));
         let angle = largest(-std::f64::consts::FRAC_PI_4, most_rad, torque);
         (torque(angle), angle)
     }
 
-    /// The most torque within the largest current, in N·m.
+    /// The largest torque within the largest current, in N·m.
     pub fn most_torque_nm(&self) -> f64 {
         self.at_magnitude(self.max_current_a).0
     }
@@ -80,7 +80,7 @@ impl<'a> Optimum<'a> {
     }
 }
 
-/// The place where a function of one hump is largest.
+/// The argument at which a function with a single maximum is largest.
 fn largest(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     const RATIO: f64 = 0.618_033_988_749_894_9;
     let (mut a, mut b) = (low, high);

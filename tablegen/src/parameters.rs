@@ -142,7 +142,7 @@ impl Parameters {
         Self::parse(&text, file)
     }
 
-    /// The same of a text that is there; errors name `file`.
+    /// The same from a given text; errors name `file`.
     pub(crate) fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
         let table = DeTable::parse(text).map_err(|error| {
             let line = error.span().map(|span| line_at(text, span.start));
@@ -164,7 +164,7 @@ impl Parameters {
         self.lines.get(key).copied()
     }
 
-    /// Limits that contradict each other.
+    /// Checks for limits that contradict each other.
     fn check(&self, file: &Path) -> Result<(), InputError> {
         for Order { low: (low_name, low), high: (high_name, high), may_be_equal } in
             self.limits().into_iter().chain(self.margins())
@@ -180,7 +180,7 @@ impl Parameters {
         self.check_switching(file)
     }
 
-    /// A demagnetisation limit below what the current limit allows anyway is none.
+    /// Rejects a demagnetisation limit below what the current limit allows anyway: it would limit nothing.
     fn check_least_id(&self, file: &Path) -> Result<(), InputError> {
         if self.min_id_a >= -self.max_current_a {
             return Ok(());
@@ -213,7 +213,7 @@ impl Parameters {
         ]
     }
 
-    /// The orders of values that would be too much, or too little, beside the other ratings.
+    /// The orders for values that would be too large, or too small, relative to the other ratings.
     fn margins(&self) -> [Order; 10] {
         let power_w = |torque_nm: f64, speed_rpm: f64| torque_nm * speed_rpm * TAU / 60.0;
         let rated_power_w = power_w(self.rated_torque_nm, self.rated_speed_rpm);
@@ -247,7 +247,7 @@ impl Parameters {
         .map(|(low, high)| Order { low, high, may_be_equal: true })
     }
 
-    /// The devices must switch at least as often as the stator's voltage turns: square wave turns each on once a turn.
+    /// Checks that the devices may switch at least as often as the stator's voltage turns: square wave turns each on once a turn.
     fn check_switching(&self, file: &Path) -> Result<(), InputError> {
         let least_hz = self.max_speed_rpm / 60.0 * f64::from(self.pole_pairs);
         if self.max_switching_hz >= least_hz {
@@ -354,7 +354,7 @@ impl<'a> Keys<'a> {
     }
 }
 
-/// Tells an unknown key, and which one was probably meant: the same quantity in another unit, or a slip of the pen.
+/// Reports an unknown key, and the one that was probably meant: the same quantity in another unit, or a typing error.
 fn unknown(name: &str) -> String {
     let known = || REQUIRED.iter().chain(OPTIONAL);
     let quantity = |key: &str| UNITS.iter().find_map(|unit| key.strip_suffix(unit).map(str::to_owned));
@@ -376,15 +376,15 @@ fn unknown(name: &str) -> String {
 /// The least number that counts as above 0.
 const ABOVE_ZERO: f64 = 1e-9;
 
-/// Voltage of a two-level inverter's link whose six-step fundamental is the largest voltage of a motor of a nine-switch inverter, over the capacitors' voltage:
-/// π/(4 √3).
+/// Link voltage of a two-level inverter whose six-step fundamental equals the largest voltage of a motor of a nine-switch inverter, over the capacitors'
+/// voltage: π/(4 √3).
 pub const TWO_LEVEL_SHARE: f64 = 0.453_449_841_058_554_5;
 
 /// Unit suffixes of the known keys, longest first.
 const UNITS: [&str; 12] =
     ["_nm_per_s", "_kg_m2", "_ohm", "_rpm", "_nm", "_hz", "_fraction", "_w", "_a", "_v", "_h", "_f"];
 
-/// Letters to insert, remove or change that turn one word into the other (Levenshtein).
+/// Number of letters to insert, remove or change that turns one word into the other (Levenshtein).
 fn slips(a: &str, b: &str) -> usize {
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.bytes().enumerate() {

@@ -3,10 +3,9 @@
 use std::fmt::Write as _;
 use tractive_control::machine::{Curve, Grid, Tables};
 
-/// The source of a machine's tables: `pub static BUILT_IN: Tables`, and `pub struct BuiltIn`, by which the compiler knows every number of
-/// them where a task is generic over its machine. `types` is the path of tractive-control's module `machine`, for example
-/// `tractive::machine`. The same tables give the same text, byte for byte; every number is the nearest f32, printed so that it
-/// reads back as itself.
+/// The source of a machine's tables: `pub static BUILT_IN: Tables`, and `pub struct BuiltIn`, through which the compiler knows every number of them
+/// where a task is generic over its machine. `types` is the path of tractive-control's module `machine`, for example `tractive::machine`. The same
+/// tables give the same text, byte for byte; every number is the nearest f32, printed so that parsing gives the same value.
 pub fn rust_source(tables: &Tables, types: &str) -> String {
     let Tables { name, ratings, flux, mtpa, weakening, z_source } = tables;
     let mut out = format!(
@@ -20,7 +19,7 @@ pub fn rust_source(tables: &Tables, types: &str) -> String {
     let currents = grid(&mut out, "WEAKENING_CURRENTS", &weakening.currents);
     let torque = curve(&mut out, "WEAKENING_TORQUE", &weakening.torque);
     let (flux_knee_wb, share_knee) = (weakening.flux_knee_wb, weakening.share_knee);
-    // A struct's own debug form is its literal.
+    // A struct's own debug format is its literal.
     let [ratings, z_source] =
         [format!("{ratings:#?}"), format!("{z_source:#?}")].map(|text| text.replace('\n', "\n    "));
     let _ = write!(

@@ -21,9 +21,9 @@ pub struct FluxPoint {
     pub lqq_h: f64,
 }
 
-/// A bicubic spline (not-a-knot) through the nodes of a flux map. Beyond the grid it goes on along its tangent, which turns as the edge does, until a slope along the edge
-/// has lost half of itself; then it turns to the mean slope of that edge. Were it to go on, flux linkage would fall somewhere, and no current would have that which a
-/// short circuit asks for.
+/// A bicubic spline (not-a-knot) through the nodes of a flux map. Beyond the grid it continues along its tangent, which turns as the edge does, until a slope
+/// along the edge has lost half of itself; then it bends to the mean slope of that edge. If the tangent went on, flux linkage would fall somewhere, and no
+/// current would have the flux linkage that a short circuit requires.
 #[derive(Clone, Debug)]
 pub struct SmoothMap {
     first_d: f64,
@@ -33,12 +33,12 @@ pub struct SmoothMap {
     cells_d: usize,
     cells_q: usize,
     cells: Vec<[Both; 16]>,
-    /// Below and above the grid, along each axis.
+    /// Edges below and above the grid, along each axis.
     edges_d: [Edge; 2],
     edges_q: [Edge; 2],
 }
 
-/// Share of itself that a slope along an edge loses on the way for which the tangent stands; and the way of its turn then, over that one.
+/// Share that a slope along an edge loses over the distance for which the tangent holds; and the length of the following bend, over that distance.
 const LOSS: f64 = 0.5;
 const TURN: f64 = 0.3;
 
@@ -46,7 +46,7 @@ impl SmoothMap {
     /// The spline of a map, mirrored to both signs of iq.
     pub fn new(map: &FluxMap) -> Self {
         let (rows, columns) = (map.id_a.len(), map.iq_a.len());
-        // Over the whole axis, so that a step that was rounded in the file does not add up.
+        // Computed over the whole axis, so that the error of a step that was rounded in the file does not add up.
         let step = |axis: &[f64]| (axis[axis.len() - 1] - axis[0]) / (axis.len() - 1) as f64;
         let (step_d, step_q) = (step(&map.id_a), step(&map.iq_a));
         let surfaces = [&map.psi_d_wb, &map.psi_q_wb].map(|nodes| Surface::new(nodes, rows, columns));
@@ -100,7 +100,7 @@ impl SmoothMap {
         }
     }
 
-    /// The current with a given flux linkage in Wb, by Newton from `start`; `None` if it does not converge.
+    /// The current for a given flux linkage in Wb, by Newton from `start`; `None` if it does not converge.
     pub fn inverse(&self, psi_d_wb: f64, psi_q_wb: f64, start: (f64, f64)) -> Option<(f64, f64)> {
         let (mut id, mut iq) = start;
         for _ in 0..60 {
@@ -111,7 +111,7 @@ impl SmoothMap {
             }
             let det = at.ldd_h * at.lqq_h - at.ldq_h * at.lqd_h;
             let (dd, dq) = ((at.lqq_h * ed - at.ldq_h * eq) / det, (at.ldd_h * eq - at.lqd_h * ed) / det);
-            // A long step crosses the knee of saturation; shorter ones find it.
+            // A long step would jump across the knee of saturation; shorter ones find it.
             let longest = 4.0 * self.step_d.max(self.step_q);
             let scale = (longest / hypot(dd, dq)).min(1.0);
             (id, iq) = (id + scale * dd, iq + scale * dq);
@@ -120,14 +120,14 @@ impl SmoothMap {
     }
 }
 
-/// Cell, fraction within it, and how far beyond the grid, in cells.
+/// Cell, fraction within it, and the distance beyond the grid, in cells.
 fn place(position: f64, cells: usize) -> (usize, f64, f64) {
     let inside = position.clamp(0.0, cells as f64);
     let cell = (inside as usize).min(cells - 1);
     (cell, inside - cell as f64, position - inside)
 }
 
-/// A quantity of both surfaces, ψd's and ψq's: the simulations spend a third of their time here, and a processor reckons two at once.
+/// A quantity of both surfaces, ψd's and ψq's: the simulations spend a third of their time here, and a processor computes two at once.
 #[derive(Clone, Copy, Debug)]
 struct Both([f64; 2]);
 
@@ -158,7 +158,7 @@ struct Value {
 }
 
 impl Value {
-    /// Of a bicubic polynomial.
+    /// The value of a bicubic polynomial.
     #[inline(always)]
     fn of(k: &[Both; 16], x: f64, y: f64) -> Self {
         let row = |i: usize| {
@@ -173,7 +173,7 @@ impl Value {
         }
     }
 
-    /// Outside the grid, so far along both axes, of which one may be 0; the slopes are those of the value there, too.
+    /// The value outside the grid, this far along both axes, either of which may be 0; the slopes are those of that value, too.
     fn beyond(self, k: &[Both; 16], (x, y): (f64, f64), along_x: Beyond, along_y: Beyond) -> Self {
         let row = |i: usize| k[4 * i + 1] + y * (2.0 * k[4 * i + 2] + 3.0 * y * k[4 * i + 3]);
         let mixed = row(1) + x * (2.0 * row(2) + 3.0 * x * row(3));
@@ -193,13 +193,13 @@ impl Value {
 struct Edge {
     /// Mean slope of the flux linkage along the axis that leaves the grid here, per cell.
     slope: f64,
-    /// The way for which the tangent stands, in cells.
+    /// The distance for which the tangent holds, in cells.
     straight: f64,
 }
 
 impl Edge {
-    /// Of some nodes, outwards in this direction of their axis; with each node's slope of the axis' own flux linkage along it, that of the other one along the edge, and how
-    /// that changes along the axis, per cell.
+    /// Made of some nodes, outwards in this direction of their axis; each node gives the slope of the axis' own flux linkage along it, that of the other one
+    /// along the edge, and the change of the latter along the axis, per cell.
     fn new(
         nodes: impl Iterator<Item = usize>,
         out: f64,
@@ -216,7 +216,7 @@ impl Edge {
         Self { slope: sum / count, straight: straight.max(f64::MIN_POSITIVE) }
     }
 
-    /// So many cells beyond it.
+    /// The way for this many cells beyond the edge.
     fn along(&self, way: f64) -> Beyond {
         let &Self { slope, straight } = self;
         if way.abs() <= straight {
@@ -229,7 +229,7 @@ impl Edge {
     }
 }
 
-/// A way beyond an edge, in cells: the part of it that goes along the tangent, the rest, the share of the tangent's slope where it ends, and the slope beside it.
+/// A way beyond an edge, in cells: the part along the tangent, the rest, the share of the tangent's slope at its end, and the mean slope.
 #[derive(Clone, Copy)]
 struct Beyond {
     near: f64,

@@ -10,10 +10,10 @@ use tractive_control::machine::{IronLoss, Mtpa, Ratings, Tables, ZSourceNetwork}
 const UNIVERSAL_NODES: usize = 65;
 /// Nodes of the torque axis: 10 N·m apart for the reference machine.
 const TORQUE_NODES: usize = 125;
-/// Reach of the torque axis over the largest torque, where current allows: room for a trim.
+/// Range of the torque axis over the largest torque, as far as current allows: room for a trim.
 const TORQUE_ROOM: f64 = 1.06;
 /// Flux ripple over which the torque's curvature is taken, in volts of the link times free carriers: 1.34 times the rms value that such a carrier
-/// leaves across the flux linkage at most. Over a ripple that is anywhere in its range alike, that is right to the fourth power.
+/// leaves across the flux linkage at most. For a ripple distributed uniformly over its range, that is right to the fourth power.
 const RIPPLE: f64 = 0.03;
 /// Least magnet flux and saliency of the MTPA parameters, as shares of flux and inductance at full torque.
 const REGULAR_SHARE: f64 = 0.02;
@@ -82,7 +82,7 @@ impl BestCurrents {
         self.0[TORQUE_NODES - 1].0
     }
 
-    /// `[id, iq, id trim, iq trim]`, in A: where the first pass begins, and what the second one leaves.
+    /// `[id, iq, id trim, iq trim]`, in A: the start of the first pass, and the error that the second one leaves.
     fn start(&self, grid: &ParameterGrid, universal: &[f64], factor: f64) -> Vec<[f32; 4]> {
         let node = |(torque, best): &(f64, (f64, f64))| {
             let passed = grid.two_passes(torque / factor, *best, universal);
@@ -106,8 +106,8 @@ impl BestCurrents {
     }
 }
 
-/// The grid of the target's current tables: the folder's own for iq ≥ 0, unless that is too coarse to be read
-/// bilinearly or too fine to be stored; then it has another even step, and values from the smooth map.
+/// The grid of the target's current tables: the folder's own for iq ≥ 0, unless that is too coarse to be read bilinearly or too fine to be stored;
+/// then it has another even step, with values from the smooth map.
 struct CurrentGrid {
     id_a: Vec<f64>,
     iq_a: Vec<f64>,
@@ -116,7 +116,7 @@ struct CurrentGrid {
 impl CurrentGrid {
     fn new(map: &FluxMap) -> Self {
         let last = map.iq_a.len() - 1;
-        // A grid of both signs may pass 0 between two nodes; its half then has a slightly smaller step.
+        // A grid with both signs may pass 0 between two nodes; its half then has a slightly smaller step.
         let half = map.iq_a.len() / 2;
         Self {
             id_a: even_axis(map.id_a[0], map.id_a[map.id_a.len() - 1], intervals(map.id_a.len() - 1)),
@@ -124,8 +124,8 @@ impl CurrentGrid {
         }
     }
 
-    /// Node values whose bilinear interpolation is right on average: a chord lies above a convex curve, by a twelfth of the second
-    /// difference on average, so the nodes lie that much below it.
+    /// Node values whose bilinear interpolation is right on average: a chord lies above a convex curve, by a twelfth of the second difference on
+    /// average, so the nodes are lowered by that amount.
     fn flux(&self, smooth: &SmoothMap) -> Vec<[f32; 2]> {
         let (step_d, step_q) = (self.id_a[1] - self.id_a[0], self.iq_a[1] - self.iq_a[0]);
         let nodes = self.id_a.iter().flat_map(|id| self.iq_a.iter().map(|iq| (*id, *iq)));
@@ -168,7 +168,7 @@ fn axis_of(values: &[f64]) -> Axis {
     Axis::new(values[0], values[values.len() - 1], values.len())
 }
 
-/// Least values of the parameters, so that nothing divides by zero.
+/// Least values of the parameters, so that there is no division by zero.
 struct Regular {
     psi_f_wb: f64,
     saliency_h: f64,
@@ -189,7 +189,7 @@ impl ParameterGrid {
             for &iq in &grid.iq_a {
                 let here = smooth.at(id, iq);
                 let psi_f = smooth.at(0.0, iq).psi_d_wb;
-                // The static inductances' limits on the axes are the incremental ones.
+                // On the axes the limits of the static inductances are the incremental ones.
                 let ld = if id.abs() < 1e-6 * step_d { here.ldd_h } else { (here.psi_d_wb - psi_f) / id };
                 let lq = if iq == 0.0 { here.lqq_h } else { here.psi_q_wb / iq };
                 nodes.push((psi_f.max(regular.psi_f_wb), (lq - ld).max(regular.saliency_h)));

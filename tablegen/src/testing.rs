@@ -1,4 +1,4 @@
-//! A machine without saturation, whose every table has a closed form.
+//! A machine without saturation: each of its tables has a closed form.
 
 use crate::MachineFolder;
 use std::fmt::Write as _;
@@ -11,7 +11,7 @@ pub struct Linear {
     pub psi_m_wb: f64,
 }
 
-/// Of 3 pole pairs and 20 A.
+/// With 3 pole pairs and 20 A.
 pub const IPM: Linear = Linear { ld_h: 0.006, lq_h: 0.015, psi_m_wb: 0.2 };
 pub const POLE_PAIRS: u32 = 3;
 pub const MOST_A: f64 = 20.0;
@@ -33,7 +33,7 @@ max_switching_hz = 5000.0
 ";
 
 impl Linear {
-    /// The folder, with some keys' lines instead.
+    /// The folder, with some keys' lines replaced.
     pub fn folder(&self, lines: &[&str]) -> MachineFolder {
         let mut toml = String::new();
         let key = |line: &str| line.split(' ').next().unwrap_or_default().to_owned();
@@ -56,7 +56,7 @@ impl Linear {
         1.5 * f64::from(POLE_PAIRS) * (self.psi_m_wb + (self.ld_h - self.lq_h) * id) * iq
     }
 
-    /// The current of a magnitude with most torque, by the derivative's zero.
+    /// The current of a magnitude with the largest torque, from the derivative's zero.
     pub fn best(&self, current_a: f64) -> (f64, f64) {
         let saliency = self.lq_h - self.ld_h;
         let root = (self.psi_m_wb.powi(2) + 8.0 * (saliency * current_a).powi(2)).sqrt();
@@ -65,7 +65,7 @@ impl Linear {
     }
 }
 
-/// A value beside the one expected, within a share of it.
+/// Checks that a value is within a share of the one expected.
 #[track_caller]
 pub fn near(value: f64, expected: f64, share: f64) {
     assert!((value - expected).abs() <= share * expected.abs().max(1e-9), "{value}, not {expected}");

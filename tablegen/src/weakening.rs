@@ -1,13 +1,13 @@
-//! Field weakening: constant-torque curves cut with circles of constant flux linkage.
+//! Field weakening: intersections of constant-torque curves with circles of constant flux linkage.
 
 use crate::{MachineFolder, Optimum, SmoothMap};
 use libm::{cos, hypot, sin};
 
-/// One circle.
+/// A circle of constant flux linkage.
 pub struct Circle {
-    /// The most torque on it within the current limit, in N·m.
+    /// The largest torque on it within the current limit, in N·m.
     pub torque_nm: f64,
-    /// Currents (id, iq) at the wanted torques, in A.
+    /// Currents (id, iq) for the requested torques, in A.
     pub currents_a: Vec<(f64, f64)>,
 }
 
@@ -37,7 +37,7 @@ pub fn circle(
     let within = |point: &Point| hypot(point.id, point.iq) <= max_current_a && point.id >= least_id_a;
     let arc = rising_arc(psi_wb, map, &optimum, within);
     let Some(top) = arc.last().copied() else {
-        // No current within the limit has this flux: nothing to give, and the current that comes nearest.
+        // No current within the limit has this flux: there is no torque, and the result is the current that comes nearest.
         let nearest = ((-max_current_a).max(least_id_a), 0.0);
         return Circle { torque_nm: TINY_TORQUE_NM, currents_a: vec![nearest; shares.len()] };
     };
@@ -47,7 +47,7 @@ pub fn circle(
         .map(|share| {
             let wanted = share * torque_nm;
             let (id, iq) = if wanted < arc[0].torque {
-                // The circle enters the current limit with more torque than that; inside it there is less.
+                // The circle enters the current limit with more torque than that; less torque lies inside the limit.
                 at_id(arc[0].id, wanted, &optimum, max_current_a)
             } else {
                 on_arc(&arc, wanted, psi_wb, map, &optimum)
@@ -58,13 +58,13 @@ pub fn circle(
     Circle { torque_nm, currents_a }
 }
 
-/// Stands for no torque where something divides by it.
+/// Stands for zero torque where something divides by it.
 const TINY_TORQUE_NM: f64 = 1e-3;
 
-/// The part of the circle where torque rises to its most, within the limits.
+/// The part of the circle where torque rises to its maximum, within the limits.
 ///
-/// On a circle wider than the magnet's flux the smallest load angles need id > 0, where reluctance torque is negative; so
-/// the whole circle is searched first, and the arc is what leads up to its summit, from below nothing there.
+/// On a circle wider than the magnets' flux the smallest load angles need id > 0, where reluctance torque is negative. So the whole circle is
+/// searched first, and the arc is the part that leads up to its summit, from below zero torque.
 fn rising_arc(
     psi_wb: f64,
     map: &SmoothMap,
@@ -98,7 +98,7 @@ fn at_angle(psi_wb: f64, angle: f64, from: (f64, f64), map: &SmoothMap, optimum:
     Some(Point { id, iq, angle, torque: optimum.torque_nm(id, iq) })
 }
 
-/// The summit, or where the current limit cuts the way to it: ever smaller steps from the best point scanned.
+/// The summit, or the point where the current limit cuts the way to it: ever smaller steps from the best point scanned.
 fn summit(
     psi_wb: f64,
     best: Point,
@@ -118,7 +118,7 @@ fn summit(
     best
 }
 
-/// The point of a torque on the arc: between the two neighbours, by bisection of the load angle.
+/// The point with a given torque on the arc: between the two neighbours, by bisection of the load angle.
 fn on_arc(arc: &[Point], wanted_nm: f64, psi_wb: f64, map: &SmoothMap, optimum: &Optimum) -> (f64, f64) {
     let upper = arc.partition_point(|point| point.torque < wanted_nm).min(arc.len() - 1);
     let (a, b) = (arc[upper.saturating_sub(1)], arc[upper]);
@@ -150,11 +150,10 @@ mod tests {
     use crate::testing::{IPM, near};
     use std::path::Path;
 
-    /// Shares of a circle's torque, little ones above all.
+    /// Shares of a circle's torque, mainly small ones.
     const SHARES: [f64; 8] = [0.0, 0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0];
 
-    /// Little torques stand at the id at which the circle comes within the current limit: there the flux linkage is the circle's, within a
-    /// step of the search.
+    /// Small torques lie at the id at which the circle enters the current limit: there the flux linkage is the circle's, within a step of the search.
     #[test]
     fn a_circle_is_entered_where_the_current_limit_cuts_it() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw");
@@ -187,7 +186,7 @@ mod tests {
         (machine, smooth)
     }
 
-    /// The most torque on a circle of a machine without saturation, by load angle, within the largest current.
+    /// The largest torque on a circle of a machine without saturation, by load angle, within the largest current.
     fn most_nm(psi_wb: f64, most_a: f64, least_id_a: f64) -> f64 {
         let at = |angle: f64| {
             let (id, iq) = ((psi_wb * angle.cos() - 0.2) / 0.006, psi_wb * angle.sin() / 0.015);
@@ -256,7 +255,7 @@ mod tests {
         }
     }
 
-    /// The arc rises from point to point, and ends at its summit; beyond what it reaches, the summit stands.
+    /// The arc rises from point to point, and ends at its summit; for torques beyond its reach, the result is the summit.
     #[test]
     fn an_arc_rises_to_its_summit() {
         let (machine, smooth) = linear();

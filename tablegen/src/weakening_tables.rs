@@ -1,7 +1,7 @@
-//! The weakening tables: circles of flux linkage beside each other, read between them as the target reads them.
+//! The weakening tables: a family of circles of flux linkage, interpolated as the target interpolates them.
 //!
-//! The target interpolates. So that what it reads never has more flux linkage or current than it asked for, every circle is
-//! made a little narrower than its row says: by the most that interpolation beside it would exceed.
+//! The target interpolates. So that the result never has more flux linkage or current than it asked for, every circle is made slightly narrower than
+//! its row says: by the largest excess that interpolation next to it would cause.
 
 use crate::axis::{Axis, curve, grid};
 use crate::weakening::{Circle, circle};
@@ -13,21 +13,21 @@ use tractive_control::machine::Weakening;
 /// Rows and columns.
 const ROWS: usize = 119;
 const COLUMNS: usize = 49;
-/// Knee of the row axis as a share of the largest flux linkage, and of the column axis: where they are half-way through. Rows
-/// stand closer where little flux is left, columns where little torque is.
+/// Knee of the row axis as a share of the largest flux linkage, and of the column axis: the value half-way along the axis. Rows are closer together
+/// at small flux, columns at small torque.
 const FLUX_KNEE: f64 = 0.3;
 const SHARE_KNEE: f64 = 0.3;
 /// Lowest voltage that counts, as a share of six-step at the lowest link.
 const LEAST_DEPTH: f64 = 0.8;
-/// Least effective flux linkage, as a share of the largest: what torque is divided by is above zero.
+/// Least effective flux linkage, as a share of the largest: the divisor of torque stays above zero.
 const LEAST_EFFECTIVE: f64 = 1e-6;
-/// Less torque than this, in N·m, is none: no current within the limit has the row's flux linkage.
+/// Torque below this, in N·m, counts as none: no current within the limit has the row's flux linkage.
 const NO_TORQUE_NM: f64 = 0.01;
-/// Samples per cell and axis at which interpolation is judged, and how often circles are made anew after it.
+/// Samples per cell and axis at which interpolation is checked, and the number of times that circles are then recomputed.
 const SAMPLES: usize = 8;
 const ROUNDS: usize = 6;
 
-/// Circles beside each other, in f64.
+/// Neighbouring circles, in f64.
 struct Circles<'a> {
     machine: &'a MachineFolder,
     smooth: &'a SmoothMap,
@@ -41,7 +41,7 @@ struct Circles<'a> {
     rows: Vec<Row>,
 }
 
-/// By how much a row's nodes have less flux linkage, and its largest current is less, than the row says, as shares.
+/// Reductions of the flux linkage of a row's nodes, and of its largest current, relative to the row's own, as shares.
 #[derive(Clone)]
 struct Margins {
     flux: Vec<f64>,
@@ -83,9 +83,9 @@ pub(crate) fn weakening_tables(
 
 /// The MTPA currents over torque.
 pub struct MtpaCurrents {
-    /// Torque of the last one, in N·m.
+    /// Torque of the last node, in N·m.
     pub last_torque_nm: f64,
-    /// id, iq at even steps from no torque, in A.
+    /// id, iq at even steps from zero torque, in A.
     pub currents_a: Vec<(f64, f64)>,
 }
 
@@ -108,25 +108,25 @@ fn mix(a: f64, b: f64, share: f64) -> f64 {
     a + (b - a) * share
 }
 
-/// Just within, in single precision, as a share.
+/// Just within a limit, in single precision, as a share.
 const ALMOST: f64 = 0.999;
-/// The smallest circle at most, as a share of the largest flux linkage.
+/// Upper bound of the smallest circle, as a share of the largest flux linkage.
 const MOST_LOW: f64 = 0.7;
 
 impl<'a> Circles<'a> {
     fn new(machine: &'a MachineFolder, smooth: &'a SmoothMap, top_flux_wb: f64) -> Self {
         let parameters = &machine.parameters;
         let max_omega = parameters.max_speed_rpm * TAU / 60.0 * f64::from(parameters.pole_pairs);
-        // Below what the lowest link gives at the highest speed, and above what full torque needs. Where the link has much voltage in
-        // reserve, the circles still lie where the machine's flux linkage does.
+        // Below what the lowest link gives at the highest speed, and above what full torque needs. If the link has much voltage in reserve, the
+        // circles still lie where the machine's flux linkage does.
         let least_wb = FRAC_2_PI * parameters.dc_link_min_v / max_omega;
         let low = (LEAST_DEPTH * least_wb).min(MOST_LOW * top_flux_wb);
-        // Nor where the demagnetisation limit leaves no current, but for what any table has.
+        // Nor where the demagnetisation limit leaves no current, except for what any table has.
         let reach_wb = smooth.at(parameters.least_id_a().max(-parameters.max_current_a), 0.0).psi_d_wb;
         let limited = parameters.least_id_a().is_finite();
         let low = if limited { low.max(reach_wb.min(ALMOST * least_wb)) } else { low };
         let high = (1.15 * top_flux_wb).max(1.5 * low);
-        // The largest torque then may take almost as much flux linkage as there is.
+        // The largest torque may then need almost all of the available flux linkage.
         let most = smooth.at(0.0, parameters.max_current_a);
         let high = if limited { high.min(ALMOST * hypot(most.psi_d_wb, most.psi_q_wb)) } else { high };
         let knee_wb = FLUX_KNEE * high;
@@ -149,7 +149,7 @@ impl<'a> Circles<'a> {
         circles
     }
 
-    /// Flux linkage that stands at a position of 0 to 1 on the row axis.
+    /// Flux linkage at a position of 0 to 1 on the row axis.
     fn flux_wb(&self, position: f64) -> f64 {
         let x = mix(self.ends.0, self.ends.1, position);
         self.knee_wb * x / (1.0 - x)
@@ -169,7 +169,7 @@ impl<'a> Circles<'a> {
             let effective = if iq > 1e-6 * max_current_a {
                 wanted_nm / (self.factor * iq)
             } else {
-                // Its limit where iq vanishes with the torque.
+                // The limit of this where iq vanishes with the torque.
                 let at = self.smooth.at(id, 0.0);
                 at.psi_d_wb - at.lqq_h * id
             };
@@ -178,8 +178,8 @@ impl<'a> Circles<'a> {
         Row { torque_nm, nodes: nodes.collect() }
     }
 
-    /// The current that gives the same torque on a circle a little off the one it stands on; where it stands on none, or none
-    /// gives it there, as it is.
+    /// The current that gives the same torque on a circle slightly off the one it lies on; unchanged if it lies on none, or if no current gives that
+    /// torque there.
     fn moved(&self, start: (f64, f64), torque_nm: f64, from_wb: f64, to_wb: f64) -> (f64, f64) {
         let (mut id, mut iq) = start;
         let highest_id = self.machine.map.id_a[self.machine.map.id_a.len() - 1];
@@ -224,7 +224,7 @@ impl<'a> Circles<'a> {
         (both(|node| node.0), torque_nm / (self.factor * both(|node| node.1)), torque_nm)
     }
 
-    /// Makes the circles narrower where interpolation beside them exceeds flux linkage or current; whether it had to.
+    /// Makes the circles narrower where interpolation next to them exceeds flux linkage or current; `true` if it had to.
     fn narrow(&mut self) -> bool {
         const ROUNDING: f64 = 1e-7;
         let mut more = vec![Margins { flux: vec![0.0; COLUMNS], current: 0.0 }; ROWS];
@@ -254,7 +254,7 @@ impl<'a> Circles<'a> {
         narrowed
     }
 
-    /// By how much flux linkage and current are exceeded within a cell, at most, as shares.
+    /// Largest excess of flux linkage and current within a cell, as shares.
     fn excess(&self, row: usize, column: usize) -> (f64, f64) {
         let mut most = (0.0_f64, 0.0_f64);
         let position = |node: usize, sample: usize, count: usize| {
@@ -263,7 +263,7 @@ impl<'a> Circles<'a> {
         for (r, c) in (0..=SAMPLES).flat_map(|r| (0..=SAMPLES).map(move |c| (r, c))) {
             let at_row = position(row, r, ROWS);
             let (id, iq, _) = self.read(at_row, position(column, c, COLUMNS));
-            // At id > 0 nothing is weakened.
+            // At id > 0 there is no field weakening.
             if id > 0.0 {
                 continue;
             }
@@ -293,15 +293,15 @@ impl<'a> Circles<'a> {
         (0..ROWS).map(at).collect()
     }
 
-    /// Largest share by which ψ² falls below, or rises above, what the voltage leaves without torque: the copper's part of the
-    /// power, for a torque at a row and the lowest voltage.
+    /// Largest share by which ψ² falls below, or rises above, what the voltage leaves without torque: the copper's part of the power, for a torque at
+    /// a row and the lowest voltage.
     fn copper_share(&self, psi_wb: f64, torque_nm: f64) -> f64 {
         let parameters = &self.machine.parameters;
         let voltage_v = LEAST_DEPTH * FRAC_2_PI * parameters.dc_link_min_v;
         2.0 * parameters.stator_resistance_ohm * torque_nm / (self.factor * voltage_v * psi_wb)
     }
 
-    /// dT_limit/dψ², the least of it within what the copper's voltage moves ψ².
+    /// Least value of dT_limit/dψ² within the range by which the copper's voltage moves ψ².
     fn slope(&self, k: usize, limits: &[f64]) -> f64 {
         let square = |k: usize| self.flux_wb(k as f64 / (ROWS - 1) as f64).powi(2);
         let reach = self.copper_share(square(k).sqrt(), limits[k]);
@@ -312,8 +312,8 @@ impl<'a> Circles<'a> {
         slopes.fold(f64::INFINITY, f64::min)
     }
 
-    /// A line over `w = 1 − √(1 − |T|/T_most)` above the excess of i² over that of the MTPA point: its height without torque,
-    /// and its rise to the most torque. The circles are those that the copper's voltage leaves, motoring and braking.
+    /// A line over `w = 1 − √(1 − |T|/T_most)` above the excess of i² over that of the MTPA point: its height without torque, and its rise to the
+    /// largest torque. The circles are those that the copper's voltage leaves, motoring and braking.
     fn above_mtpa(&self, k: usize, limits: &[f64], mtpa: &MtpaCurrents) -> (f64, f64) {
         const STEPS: usize = 64;
         let psi_wb = self.flux_wb(k as f64 / (ROWS - 1) as f64);
@@ -326,7 +326,7 @@ impl<'a> Circles<'a> {
             let w = 1.0 - (1.0 - torque_nm / circle_nm).max(0.0).sqrt();
             let (id, iq, _) = self.read(position, w / (w + SHARE_KNEE) * (1.0 + SHARE_KNEE));
             let (best_d, best_q) = mtpa.at(torque_nm);
-            // Right of the MTPA point nothing is weakened.
+            // To the right of the MTPA point there is no field weakening.
             if id > best_d { 0.0 } else { (id * id + iq * iq - best_d * best_d - best_q * best_q).max(0.0) }
         };
         let without = at(0.0, 1.0);

@@ -1,8 +1,8 @@
 //! CAN: FDCAN1 with classic frames at 500 kbit/s, served from the idle loop.
 //!
-//! Its clock is the crystal itself, so the bit rate does not depend on the PLL. The message RAM of this chip has a fixed layout:
-//! filters, two receive FIFOs and a transmit FIFO of three elements each, 18 words an element. Only the protocol's own identifiers
-//! pass the filters; remote frames and 29-bit identifiers never do.
+//! Its clock is the crystal itself, so the bit rate does not depend on the PLL. The message RAM of this chip has a fixed layout: filters, two receive
+//! FIFOs and a transmit FIFO of three elements each, with 18 words an element. Only the protocol's own identifiers pass the filters; remote frames
+//! and 29-bit identifiers never do.
 
 use super::start::{StartError, Wait};
 use stm32_metapac as pac;
@@ -17,12 +17,12 @@ pub const BIT_RATE: u32 = 500_000;
 /// The point in a bit at which it is sampled, in thousandths, as CiA recommends.
 pub const SAMPLE_POINT: u32 = 875;
 
-/// A bit's length, in quanta; each value as it is, not as the register holds it.
+/// The length of a bit, in quanta; each value is the true one, not the one that the register holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitTiming {
     /// Clock cycles in a quantum, 1 ..= 512.
     pub prescaler: u32,
-    /// Quanta from the synchronisation's to the sample point, 1 ..= 256.
+    /// Quanta from the synchronisation quantum to the sample point, 1 ..= 256.
     pub before_sample: u32,
     /// Quanta after it, 1 ..= 128.
     pub after_sample: u32,
@@ -34,7 +34,7 @@ impl BitTiming {
         1 + self.before_sample + self.after_sample
     }
 
-    /// The timing with 16 quanta a bit; `None` if clock, rate and sample point do not come out exactly.
+    /// The timing with 16 quanta a bit; `None` if clock, rate and sample point do not match exactly.
     pub const fn exact(clock_hz: u32, bit_rate: u32, sample_point: u32) -> Option<Self> {
         const QUANTA: u32 = 16;
         let quantum_hz = bit_rate * QUANTA;
@@ -60,7 +60,7 @@ pub const TIMING: BitTiming = match BitTiming::exact(CLOCK_HZ, BIT_RATE, SAMPLE_
 const ELEMENT: usize = 18;
 /// Elements of a FIFO.
 const ELEMENTS: usize = 3;
-/// Slots after a bus-off until it is left, in ms: a bus that is shorted is not stormed.
+/// Slots from a bus-off until the controller rejoins the bus, in ms, so that a shorted bus is not flooded.
 pub const BUS_OFF_MS: u32 = 100;
 
 /// The state of the bus.
@@ -68,7 +68,7 @@ pub const BUS_OFF_MS: u32 = 100;
 pub struct Health {
     /// Frames that found the transmit FIFO full; wraps.
     pub dropped: u32,
-    /// The number of times that the controller has left the bus; wraps.
+    /// Number of times that the controller has left the bus; wraps.
     pub bus_offs: u32,
 }
 
@@ -78,21 +78,21 @@ pub struct Can {
     can: pac::can::Fdcan,
     ram: pac::fdcanram::Fdcanram,
     health: Health,
-    /// Slots until the bus is joined again, while it is off.
+    /// Slots until the bus is rejoined, while it is off.
     waits_ms: Option<u32>,
 }
 
 impl Can {
-    /// The chip's.
+    /// The chip's own.
     pub const CHIP: Self = Self::new(pac::FDCAN1, pac::FDCANRAM1);
 
-    /// Of these blocks.
+    /// Made of these blocks.
     pub const fn new(can: pac::can::Fdcan, ram: pac::fdcanram::Fdcanram) -> Self {
         Self { can, ram, health: Health { dropped: 0, bus_offs: 0 }, waits_ms: None }
     }
 
-    /// Clock, timing, filters for these messages; then it joins the bus. Its pins follow, so that nothing dominant is sent before. The
-    /// crystal is its clock, whatever the start has come to.
+    /// Sets clock, timing and filters for these messages, then joins the bus. The pins are configured afterwards, so that nothing dominant is sent
+    /// before. The clock is the crystal, however far the start has come.
     pub fn configure(
         &self,
         messages: &[&Message],
@@ -103,12 +103,12 @@ impl Can {
         wait.until(&mut || rcc.cr().read().hserdy()).or(Err(StartError::Can))?;
         rcc.ccipr().modify(|w| w.set_fdcansel(Fdcansel::HSE));
         rcc.apb1enr1().modify(|w| w.set_fdcanen(true));
-        // A peripheral takes writes only some cycles after its clock has been enabled.
+        // A peripheral accepts writes only some cycles after its clock has been enabled.
         wait.microseconds(1);
         let can = self.can;
         can.cccr().modify(|w| w.set_init(true));
         wait.until(&mut || can.cccr().read().init()).or(Err(StartError::Can))?;
-        // Everything below is write-protected until this.
+        // Everything below is write-protected until this bit is set.
         can.cccr().modify(|w| w.set_cce(true));
         can.cccr().modify(|w| {
             w.set_fdoe(false);
@@ -123,7 +123,7 @@ impl Can {
             w.set_nbrp((TIMING.prescaler - 1) as u16);
             w.set_ntseg1((TIMING.before_sample - 1) as u8);
             w.set_ntseg2((TIMING.after_sample - 1) as u8);
-            // As far as the segment after the sample point goes.
+            // As long as the segment after the sample point.
             w.set_nsjw((TIMING.after_sample - 1) as u8);
         });
         can.rxgfc().write(|w| {
@@ -131,7 +131,7 @@ impl Can {
             w.set_rrfs(true);
             w.set_anfe(Anfe::REJECT);
             w.set_anfs(Anfs::REJECT);
-            // A full FIFO keeps what it has: the sequence's gap is seen by the counters.
+            // A full FIFO keeps what it has: the counters show the gap in the sequence.
             w.set_f0om(false);
             // Two identifiers share a filter.
             w.set_lss(messages.len().div_ceil(2) as u8);
@@ -147,7 +147,7 @@ impl Can {
         wait.until(&mut || !can.cccr().read().init()).or(Err(StartError::Can))
     }
 
-    /// Leaves the initialisation: the controller waits for eleven recessive bits, after a bus-off for 128 times as many.
+    /// Leaves the initialisation: the controller waits for eleven recessive bits, or 128 times as many after a bus-off.
     fn join(&self) {
         self.can.cccr().modify(|w| {
             w.set_cce(false);
@@ -155,7 +155,7 @@ impl Can {
         });
     }
 
-    /// Takes the frames that have come, the oldest first, as many as there is room for; gives their number.
+    /// Takes the received frames, oldest first, as many as there is room for; returns their number.
     pub fn receive(&mut self, into: &mut [Frame]) -> usize {
         let status = self.can.rxfs(0).read();
         let taken = usize::from(status.ffl()).min(ELEMENTS).min(into.len());
@@ -163,7 +163,7 @@ impl Can {
             *frame = self.element((usize::from(status.fgi()) + element) % ELEMENTS);
         }
         if taken > 0 {
-            // The last one that was read: with it those before it are given back.
+            // The last one that was read: releasing it releases those before it, too.
             let last = (usize::from(status.fgi()) + taken - 1) % ELEMENTS;
             self.can.rxfa(0).write(|w| w.set_fai(last as u8));
         }
@@ -174,7 +174,7 @@ impl Can {
     fn element(&self, index: usize) -> Frame {
         let base = index * ELEMENT;
         let [id, length, low, high] = [0, 1, 2, 3].map(|word| self.ram.rxfifo0(base + word).read());
-        // Codes above 8 stand for eight bytes.
+        // Codes above 8 mean eight bytes.
         let length = (length >> 16 & 0xF).min(8) as u8;
         let [a, b, c, d] = low.to_le_bytes();
         let [e, f, g, h] = high.to_le_bytes();
@@ -183,7 +183,7 @@ impl Can {
         Frame { id: (id >> 18 & 0x7FF) as u16, length, data }
     }
 
-    /// Sends a frame, or drops it if three wait already: the newest telemetry comes again, and a bus that nobody listens to fills no memory.
+    /// Sends a frame, or drops it if three are already waiting: telemetry is repeated, and a bus without listeners fills no memory.
     pub fn send(&mut self, frame: &Frame) {
         let status = self.can.txfqs().read();
         if status.tfqf() {
@@ -204,7 +204,7 @@ impl Can {
         self.can.txbar().write(|w| w.set_ar(index, true));
     }
 
-    /// Once a millisecond: joins the bus again some time after a bus-off.
+    /// Called once a millisecond: rejoins the bus some time after a bus-off.
     pub fn tend(&mut self) {
         if !self.can.psr().read().bo() {
             self.waits_ms = None;
@@ -216,7 +216,7 @@ impl Can {
                 self.waits_ms = Some(BUS_OFF_MS);
             }
             Some(0) => {
-                // The controller has set it itself; the flag stays until the bus was quiet for long enough.
+                // The controller has set the bit itself; the flag stays until the bus has been quiet for long enough.
                 if self.can.cccr().read().init() {
                     self.join();
                 }

@@ -42,8 +42,7 @@ unsafe extern "C" {
     fn DefaultHandler();
 }
 
-/// The vector table's device part. Every entry leads somewhere; those that a firmware does not define, and all others, to the
-/// default handler.
+/// The device part of the vector table. Every entry has a target; those that a firmware does not define, and all others, lead to the default handler.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [unsafe extern "C" fn(); 102] = {
@@ -57,8 +56,8 @@ pub static __INTERRUPTS: [unsafe extern "C" fn(); 102] = {
 struct Unlocked;
 critical_section::set_impl!(Unlocked);
 
-// SAFETY: only the log takes critical sections, and only the idle loop logs: there is never a second one to keep out. So
-// nothing is masked, and no interrupt is ever late for a message.
+// SAFETY: only the log takes critical sections, and only the idle loop logs, so there is never a second one to keep out. Therefore nothing is masked,
+// and no interrupt is ever delayed by a message.
 unsafe impl critical_section::Impl for Unlocked {
     unsafe fn acquire() -> critical_section::RawRestoreState {}
     unsafe fn release(_: critical_section::RawRestoreState) {}
@@ -69,7 +68,7 @@ pub(super) struct Cycles;
 
 impl Wait for Cycles {
     fn until(&mut self, done: &mut dyn FnMut() -> bool) -> Result<(), Timeout> {
-        // 100 ms and more: the crystal takes a few.
+        // 100 ms and more: the crystal takes a few ms.
         for _ in 0..10_000 {
             if done() {
                 return Ok(());
@@ -84,10 +83,10 @@ impl Wait for Cycles {
     }
 }
 
-/// Frequency of the internal oscillator, the core's from a reset until it is switched to the PLL, in Hz.
+/// Frequency of the internal oscillator, which clocks the core from a reset until the switch to the PLL, in Hz.
 const RESET_HZ: u32 = 16_000_000;
 
-/// Waits a slot's time where no interrupt beats, on whatever clock the start has left the core.
+/// Waits for the time of a slot when no interrupt sets the beat, whatever clock the start has left the core on.
 pub(super) fn pause_a_slot() {
     let core_hz = match Registers::CHIP.rcc.cfgr().read().sws() {
         Sw::PLL1_R => CORE_HZ,
@@ -96,13 +95,13 @@ pub(super) fn pause_a_slot() {
     cortex_m::asm::delay(core_hz / 1_000);
 }
 
-/// Configures everything, gates off. Call it once.
+/// Configures everything with the gates off. Call it once.
 pub fn prepare(devices: SwitchLimits) -> Result<Found, StartError> {
     let found = start::prepare(&Registers::CHIP, &mut Cycles, devices);
     join_bus(found, &TO_DRIVE, &pins::PINS)
 }
 
-/// Joins the bus for these messages, started or not: there it is said why not.
+/// Joins the bus for these messages even if the start failed: the bus then reports the reason.
 pub(super) fn join_bus<T>(
     found: Result<T, StartError>,
     messages: &[&Message],
@@ -112,11 +111,11 @@ pub(super) fn join_bus<T>(
         defmt::error!("no start: {}", error);
     }
     let registers = Registers::CHIP;
-    // The ports of the bus's pins among them: the start may not have come so far.
+    // This includes the ports of the bus's pins: the start may have failed before enabling them.
     clock::enable_peripherals(&registers, &mut Cycles);
     match Can::CHIP.configure(messages, &registers.rcc, &mut Cycles) {
         Ok(()) => pins::configure_bus(&registers, of),
-        // Nobody can command the drive then; it rests.
+        // Nobody can command the drive then; it stays at rest.
         Err(error) => defmt::error!("no bus: {}", error),
     }
     found
@@ -127,18 +126,18 @@ pub fn run() {
     run_with(Interrupt::TIM1_UP_TIM16, Interrupt::TIM3, start::run);
 }
 
-/// The PWM interrupt's priority, as the interrupt controller has it: of two the lower number preempts. The chip has the upper four bits.
+/// The PWM interrupt's priority in the interrupt controller: the lower number preempts. The chip implements the upper four bits.
 const PWM_PRIORITY: u8 = 0x40;
 /// The control interrupt's.
 const CONTROL_PRIORITY: u8 = 0x80;
 const _: () = assert!(PWM_PRIORITY >> 4 < CONTROL_PRIORITY >> 4, "PWM preempts control");
 
-/// Lets both interrupts come and starts their timers. Call it once.
+/// Enables both interrupts and starts their timers. Call it once.
 pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers, &mut dyn Wait)) {
     // SAFETY: the only use of the core peripherals, before any interrupt is unmasked.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
-    // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that
-    // both may come: their handlers share nothing but cells and registers that each writes as the modules say.
+    // SAFETY: priorities are changed while both interrupts are masked; no code relies on a priority ceiling. After that both may come: their handlers
+    // share only cells and registers, which each writes as the modules say.
     unsafe {
         core.NVIC.set_priority(pwm, PWM_PRIORITY);
         core.NVIC.set_priority(control, CONTROL_PRIORITY);
@@ -149,7 +148,7 @@ pub(super) fn run_with(pwm: Interrupt, control: Interrupt, start: fn(&Registers,
     defmt::info!("running");
 }
 
-/// Makes the PWM interrupt come at once, between two boundaries.
+/// Triggers the PWM interrupt at once, between two boundaries.
 pub fn revise_pulses() {
     NVIC::pend(Interrupt::TIM1_UP_TIM16);
     // It has run before anything else is done.
@@ -157,15 +156,15 @@ pub fn revise_pulses() {
     cortex_m::asm::isb();
 }
 
-/// The last thing in an interrupt: its stores are done before it returns. A store that is still under way while a handler returns and another
-/// interrupt changes what comes next can let the core fetch the wrong vector (Cortex-M4 erratum 838869).
+/// The last step in an interrupt: completes its stores before it returns. A store that is still under way while a handler returns and another
+/// interrupt changes what comes next can make the core fetch the wrong vector (Cortex-M4 erratum 838869).
 #[inline(always)]
 pub fn complete_stores() {
     cortex_m::asm::dsb();
 }
 
-/// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the flight recorder
-/// holds. Where the start was `refused` it says why to whoever asks on the bus.
+/// The idle loop, which never ends: serves the bus and the operator, feeds the watchdog, logs changes, and after a fault logs the records of the
+/// flight recorder. If the start was `refused`, it reports the reason to whoever asks on the bus.
 pub fn idle(refused: Option<FailedCheck>) -> ! {
     idle_over(CanEndpoint::new(&BUILT_IN.ratings), refused)
 }
@@ -190,12 +189,12 @@ pub fn idle_over(station: impl Station, refused: Option<FailedCheck>) -> ! {
     }
 }
 
-/// All outputs off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
+/// Turns all outputs off for good, whatever state the program is in, then does nothing more; the watchdog resets the chip if it runs.
 pub fn die() -> ! {
     die_on(&pins::PINS)
 }
 
-/// The same for a system's pins.
+/// The same for the pins of a system.
 pub(super) fn die_on(of: &[Pin]) -> ! {
     start::switch_off(&Registers::CHIP, of);
     loop {
@@ -203,7 +202,7 @@ pub(super) fn die_on(of: &[Pin]) -> ! {
     }
 }
 
-/// The handlers of a firmware that no drive survives: each ends in what is given, which turns all outputs off.
+/// The handlers of a firmware for conditions that no drive survives: each ends in the given function, which turns all outputs off.
 #[macro_export]
 macro_rules! last_resorts {
     ($die:path) => {
@@ -212,7 +211,7 @@ macro_rules! last_resorts {
             $die()
         }
 
-        /// Any other exception or interrupt: there is none that the drive survives (the clock security system's among them).
+        /// Any other exception or interrupt: the drive survives none of them (the clock security system's is one).
         #[cortex_m_rt::exception]
         unsafe fn DefaultHandler(_number: i16) -> ! {
             $die()

@@ -4,31 +4,31 @@ use super::registers::Registers;
 use super::start::{StartError, Wait};
 use stm32_metapac::{flash, rcc};
 
-/// PWR_CR2.PLS of the supply below which the gates go off, some 2.9 V: the highest one. Comparators and converters have the supply as
-/// their reference.
+/// PWR_CR2.PLS: the supply threshold below which the gates go off, some 2.9 V, the highest one. Comparators and converters use the supply as their
+/// reference.
 const SUPPLY_THRESHOLD: u8 = 6;
 
-/// PWR_CR5.R1MODE (RM0440): bit 8, set after a reset. The register crate has it in bit 0, where nothing is.
+/// PWR_CR5.R1MODE (RM0440): bit 8, set after a reset. The register crate places it in bit 0, which is unused.
 const NORMAL_MODE: u32 = 1 << 8;
 
-/// Takes USB's dead-battery pull-downs of 5.1 kΩ off PB4 and PB6. They are there from reset on, switched by PA9 and PA10, all of
-/// which have other uses here (RM0440, PWR_CR3.UCPD1_DBDIS). The power controller is clocked from here on.
+/// Removes USB's dead-battery pull-downs of 5.1 kΩ from PB4 and PB6. They are active from reset on, controlled by PA9 and PA10; all these pins have
+/// other uses here (RM0440, PWR_CR3.UCPD1_DBDIS). The power controller is clocked from here on.
 pub fn release_dead_battery(registers: &Registers, wait: &mut dyn Wait) {
     registers.rcc.apb1enr1().modify(|w| w.set_pwren(true));
-    // A peripheral takes writes only some cycles after its clock has been enabled.
+    // A peripheral accepts writes only some cycles after its clock has been enabled.
     wait.microseconds(1);
     registers.pwr.cr3().modify(|w| w.set_ucpd1_dbdis(true));
 }
 
-/// 24 MHz / 6 · 85 / 2 = 170 MHz, with the wait states and the core voltage that this needs. If the crystal stops later, the clock
-/// security system breaks the PWM timers in hardware.
+/// 24 MHz / 6 · 85 / 2 = 170 MHz, with the wait states and the core voltage that this needs. If the crystal stops later, the clock security system
+/// triggers a break of the PWM timers in hardware.
 pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), StartError> {
     let Registers { rcc, pwr, flash, .. } = *registers;
     pwr.cr2().modify(|w| {
         w.set_pls(SUPPLY_THRESHOLD);
         w.set_pvde(true);
     });
-    // Boost: range 1 without it ends at 150 MHz. The bit's name says normal mode.
+    // Boost mode: range 1 without it ends at 150 MHz. The bit's name says normal mode.
     pwr.cr5().modify(|w| w.0 &= !NORMAL_MODE);
     flash.acr().modify(|w| {
         w.set_latency(flash::vals::Latency::WS4);
@@ -49,7 +49,7 @@ pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), Start
     });
     rcc.cr().modify(|w| w.set_pllon(true));
     wait.until(&mut || rcc.cr().read().pllrdy()).or(Err(StartError::Pll))?;
-    // Above 150 MHz the buses have to pass through half the frequency for a microsecond.
+    // Above 150 MHz the buses have to run at half the frequency for a microsecond first.
     rcc.cfgr().write(|w| {
         w.set_hpre(rcc::vals::Hpre::DIV2);
         w.set_sw(rcc::vals::Sw::PLL1_R);
@@ -61,9 +61,9 @@ pub fn configure(registers: &Registers, wait: &mut dyn Wait) -> Result<(), Start
     Ok(())
 }
 
-/// Clocks of the peripherals; timers and processor stop together under a debugger, and stopped PWM and chopper timers have their
-/// outputs off. The watchdog goes on: it resets a halted chip, which opens the contactors too. A locked-up processor, a bad
-/// memory word or a low supply breaks the timers.
+/// Enables the clocks of the peripherals. Timers and processor stop together under a debugger, and stopped PWM and chopper timers have their outputs
+/// off. The watchdog runs on: it resets a halted chip, which opens the contactors too. A locked-up processor, a bad memory word or a low supply
+/// triggers a break of the timers.
 pub fn enable_peripherals(registers: &Registers, wait: &mut dyn Wait) {
     let Registers { rcc, syscfg, dbgmcu, .. } = *registers;
     rcc.ahb2enr().modify(|w| {

@@ -1,7 +1,7 @@
 //! The comparators: overcurrent of either sign turns the gates off without clock or software.
 //!
-//! Each current is wired to two of them. One breaks above the upper threshold, the other, inverted, below the lower one.
-//! Thresholds are on-chip DACs with the converters' reference, so a code means the same current to all of them.
+//! Each current is wired to two comparators. One triggers a break above the upper threshold, the other, inverted, below the lower one. Thresholds are
+//! on-chip DACs with the converters' reference, so a code means the same current to all of them.
 
 use super::power_stage::PowerStage;
 use super::registers::Registers;
@@ -12,23 +12,23 @@ use stm32_metapac::{comp, dac};
 pub struct Watch {
     /// COMP1 ..= COMP7.
     pub number: usize,
-    /// The wire is on the second of its two inputs.
+    /// `true` if the wire is on the second of its two inputs.
     pub second_input: bool,
-    /// It breaks below its threshold, not above.
+    /// `true` if it breaks below its threshold, not above.
     pub below: bool,
-    /// Its threshold: a DAC (that of 1 and 3 is DAC3 channel 1, of 2 and 4 DAC3 channel 2, of 6 DAC4 channel 2, of 7 DAC4
-    /// channel 1), or the internal reference of 1.2 V.
+    /// Its threshold: a DAC (for 1 and 3 DAC3 channel 1, for 2 and 4 DAC3 channel 2, for 6 DAC4 channel 2, for 7 DAC4 channel 1), or the internal
+    /// reference of 1.2 V.
     pub threshold: comp::vals::Inm,
 }
 
 impl Watch {
-    /// With a DAC's threshold.
+    /// With a DAC as its threshold.
     pub const fn dac(number: usize, second_input: bool, below: bool) -> Self {
         Self { number, second_input, below, threshold: comp::vals::Inm::DACA }
     }
 }
 
-/// Each current on two comparators.
+/// Each current is on two comparators.
 const WATCHES: [Watch; 6] = [
     Watch::dac(1, false, false),
     Watch::dac(3, true, false),
@@ -44,7 +44,7 @@ pub fn configure(registers: &Registers, stage: &PowerStage) {
     configure_watches(registers, [[upper, lower], [lower, upper]], &WATCHES);
 }
 
-/// Sets thresholds (codes of DAC3 and DAC4, both channels), then comparators, and locks these until the next reset.
+/// Sets thresholds (codes of DAC3 and DAC4, both channels), then the comparators, and locks the latter until the next reset.
 pub fn configure_watches(registers: &Registers, thresholds: [[u16; 2]; 2], watches: &[Watch]) {
     for (converter, codes) in [registers.dac3, registers.dac4].into_iter().zip(thresholds) {
         converter.mcr().write(|w| {
@@ -67,7 +67,7 @@ pub fn configure_watches(registers: &Registers, thresholds: [[u16; 2]; 2], watch
             w.set_inmsel(watch.threshold);
             w.set_inpsel(watch.second_input);
             w.set_hyst(comp::vals::Hysteresis::HYST20M);
-            // The internal reference has to be lent to the comparator.
+            // The internal reference has to be enabled for the comparator.
             w.set_scalen(watch.threshold == comp::vals::Inm::VREF);
             if watch.below {
                 w.set_polarity(comp::vals::Polarity::INVERTED);

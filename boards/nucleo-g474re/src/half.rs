@@ -1,9 +1,9 @@
-//! A carrier half as the timers' shadow registers take it.
+//! A carrier half in the form that the timers' shadow registers take.
 //!
-//! Each leg has two compares and is at the upper level while the counter is below the first **or** at the second and
-//! beyond: `CNT < fall || CNT >= rise`. That is a pair of channels in the combined PWM modes. A half that
-//! starts high falls at `fall` and never rises; one that starts low has `fall` = 0 and rises at `rise`. So start level
-//! and toggle are both nothing but compare values, which take over together at the update event.
+//! Each leg has two compares. It is at the upper level while the counter is below the first **or** at or above the second:
+//! `CNT < fall || CNT >= rise`. That is a pair of channels in the combined PWM modes. A half that starts high falls at `fall` and never rises; one
+//! that starts low has `fall` = 0 and rises at `rise`. So start level and toggle are nothing but compare values, which all take effect together at
+//! the update event.
 
 use tractive::modulation::{CarrierHalf, Mode};
 
@@ -27,7 +27,7 @@ impl LegCompares {
         Self { fall: if high { NEVER } else { 0 }, rise: NEVER }
     }
 
-    /// A level that toggles `compare_ticks` after the start; [`NEVER`] and beyond: it stays.
+    /// A level that toggles `compare_ticks` after the start; at [`NEVER`] and beyond it stays.
     pub const fn toggling(start_high: bool, compare_ticks: u32) -> Self {
         let toggle = if compare_ticks < NEVER as u32 { compare_ticks as u16 } else { NEVER };
         if start_high { Self { fall: toggle, rise: NEVER } } else { Self { fall: 0, rise: toggle } }
@@ -49,10 +49,10 @@ pub struct HalfRegisters {
 }
 
 impl HalfRegisters {
-    /// From the modulator's half. While the gates are off the legs keep the levels `held`, so that no device turns on
-    /// between the half's beginning and the moment when software switches the outputs off.
+    /// Made of the modulator's half. While the gates are off the legs keep the levels `held`, so that no device turns on between the half's beginning
+    /// and the moment when software switches the outputs off.
     ///
-    /// A half is 1 ..= [`LONGEST_HALF_TICKS`] long; longer ones are cut, which the board's start refuses to let happen.
+    /// A half is 1 ..= [`LONGEST_HALF_TICKS`] long; longer ones would be cut, which the board's start rules out.
     pub fn new(half: &CarrierHalf, held: [bool; 3]) -> Self {
         let mut legs = held.map(LegCompares::steady);
         if half.mode != Mode::Off {
@@ -64,7 +64,7 @@ impl HalfRegisters {
         Self { reload: reload(half.period_ticks), legs }
     }
 
-    /// The levels on which the half ends.
+    /// The levels at which the half ends.
     pub fn end_levels(&self) -> [bool; 3] {
         self.legs.map(|leg| leg.is_high(self.reload))
     }

@@ -1,23 +1,22 @@
 //! The three legs: TIM1 and TIM8 as one PWM timer.
 //!
 //! # How a half is played
-//! Both timers count up, one period a carrier half. Leg U is TIM1's channel pair 1 and 2, V its pair 3 and 4, W TIM8's pair
-//! 1 and 2. The odd channel of a pair is in combined PWM mode 1 and drives the outputs OCx and OCxN; the even one is in
-//! combined PWM mode 2 and only lends its compare: `CNT < CCRodd || CNT >= CCReven`. So a half's start levels and toggles
-//! are compare values, and no mode bit ever changes from half to half.
+//! Both timers count up, one period per carrier half. Leg U is TIM1's channel pair 1 and 2, V its pair 3 and 4, W TIM8's pair 1 and 2. The odd
+//! channel of a pair is in combined PWM mode 1 and drives the outputs OCx and OCxN; the even one is in combined PWM mode 2 and only lends its
+//! compare: `CNT < CCRodd || CNT >= CCReven`. So a half's start levels and toggles are compare values, and no mode bit ever changes from half to
+//! half.
 //!
 //! # What is shadowed
 //! | taken over at the update event | at once |
 //! |---|---|
 //! | ARR (ARPE), CCR1 ..= CCR4 (OCxPE), PSC (always) | OCxM, CCxE, CCxNE (CCPC = 0: no COM event is needed), MOE, the dead time |
 //!
-//! [`Legs::play`] writes ARR and compares only: all of a half changes in the same clock. What acts at once is written
-//! only at start and to leave normal operation.
+//! [`Legs::play`] writes ARR and compares only, so everything about a half changes in the same clock. Registers that act at once are written only at
+//! the start and to leave normal operation.
 //!
 //! # TIM8
-//! Each update of TIM1 is its TRGO, which resets TIM8 and makes it take over its own compares (combined reset and trigger
-//! mode). TIM8's own reload is never reached, so the two cannot drift apart, and W follows U and V by the few cycles
-//! of the trigger's synchroniser, always the same.
+//! Each update of TIM1 is its TRGO, which resets TIM8 and makes it take over its own compares (combined reset and trigger mode). TIM8's own reload is
+//! never reached, so the two cannot drift apart. W follows U and V by the few cycles of the trigger's synchroniser, always the same number.
 //!
 //! # On and off
 //! See [`super::outputs`].
@@ -45,8 +44,8 @@ pub struct Legs {
 }
 
 impl Legs {
-    /// Everything but what makes the timers count: outputs off, all legs low, halves of `reload` + 1 ticks. Call it once after a
-    /// reset: it ends with the write that locks dead time, break and polarities.
+    /// Configures everything except the start of counting: outputs off, all legs low, halves of `reload` + 1 ticks. Call it once after a reset: its
+    /// last write locks dead time, break and polarities.
     pub fn configure(&self, prescaler: u16, dead_time: DeadTime, reload: u16) {
         for timer in [self.tim1, self.tim8] {
             timer.cr1().write(|w| {
@@ -81,7 +80,7 @@ impl Legs {
         Outputs([self.tim1, self.tim8])
     }
 
-    /// Starts to count: TIM1's update by software takes over what is preloaded, and its TRGO starts whoever waits for it.
+    /// Starts counting: TIM1's update by software takes over what is preloaded, and its TRGO starts every timer that waits for it.
     pub fn start(&self) {
         self.tim1.dier().write(|w| w.set_uie(true));
         self.tim1.cr1().modify(|w| w.set_cen(true));
@@ -119,7 +118,7 @@ impl Legs {
         self.tim1.sr().read().uif()
     }
 
-    /// Switches the outputs on, unless a break is latched or the lower devices short the machine.
+    /// Switches the outputs on, unless a break is latched or the lower devices short-circuit the machine.
     #[inline]
     pub fn switch_on(&self) {
         if !self.is_short_circuited() {
@@ -127,7 +126,7 @@ impl Legs {
         }
     }
 
-    /// Switches the outputs off for a while, unless the lower devices short the machine.
+    /// Switches the outputs off for a while, unless the lower devices short-circuit the machine.
     #[inline]
     pub fn switch_off(&self) {
         if !self.is_short_circuited() {
@@ -146,13 +145,13 @@ impl Legs {
         self.outputs().trip();
     }
 
-    /// The same on software's own account.
+    /// The same, with the software cause recorded.
     #[inline]
     pub fn trip_by(&self, software: SoftwareBreak) {
         self.outputs().trip_by(software);
     }
 
-    /// On whose account software has broken; `None` where the hardware was first.
+    /// The software cause of a break; `None` if the hardware was first.
     #[inline]
     pub fn software_break(&self) -> Option<SoftwareBreak> {
         self.outputs().software_break()
@@ -164,8 +163,7 @@ impl Legs {
         self.outputs().is_tripped()
     }
 
-    /// Forgets a break or a short circuit: outputs off, legs as they are played again. `false` while the cause of a break lasts,
-    /// which sets its flag again.
+    /// Clears a break or a short circuit: outputs off, legs played again. `false` while the cause of a break lasts, because it sets the flag again.
     #[inline]
     pub fn leave(&self) -> bool {
         self.outputs().switch_off();
@@ -175,7 +173,7 @@ impl Legs {
         self.outputs().leave()
     }
 
-    /// The three lower devices on for good, unless a break is latched that the drive has not made. The dead time passes first, in hardware.
+    /// Turns the three lower devices on for good, unless a break is latched that the drive has not made. The dead time passes first, in hardware.
     #[inline]
     pub fn short_circuit(&self) {
         if self.software_break() == Some(SoftwareBreak::Drive) {
@@ -190,19 +188,19 @@ impl Legs {
         self.outputs().switch_on();
     }
 
-    /// `true` if they are to be.
+    /// `true` if the lower devices are commanded to short-circuit the machine.
     #[inline]
     pub fn is_short_circuited(&self) -> bool {
         self.tim1.ccmr_output(FIRST_PAIR).read().ocm(0) == vals::Ocm::FORCE_INACTIVE
     }
 }
 
-/// A pair as one leg, both compares preloaded.
+/// A pair that acts as one leg, both compares preloaded.
 fn combined() -> regs::CcmrOutputGp16 {
     pair(vals::Ocm::COMBINED_PWM_MODE_1)
 }
 
-/// The leg low at once, whatever the compares say.
+/// Forces the leg low at once, whatever the compares say.
 fn forced_low() -> regs::CcmrOutputGp16 {
     pair(vals::Ocm::FORCE_INACTIVE)
 }
@@ -216,7 +214,7 @@ fn pair(odd: vals::Ocm) -> regs::CcmrOutputGp16 {
     modes
 }
 
-/// Output and complementary output of these channels, active high.
+/// Enables output and complementary output of these channels, active high.
 fn driven(channels: &[usize]) -> regs::CcerAdv {
     let mut enabled = regs::CcerAdv(0);
     for channel in channels {
@@ -226,7 +224,7 @@ fn driven(channels: &[usize]) -> regs::CcerAdv {
     enabled
 }
 
-/// Status flags are cleared by writing 0 and left alone by writing 1.
+/// Status flags are cleared by writing 0; writing 1 leaves them alone.
 const fn all_but_update() -> regs::SrAdv {
     regs::SrAdv(!1)
 }

@@ -1,13 +1,13 @@
 //! ST's NUCLEO-G474RE (STM32G474RE, Cortex-M4F at 170 MHz), registers only.
 //!
-//! * PWM timer: TIM1 with TIM8 in step, one period a carrier half; [`legs`] says how a half is played and which registers
-//!   are shadowed, [`half`] how it becomes compare values, [`dead_time`] how the dead time is coded.
+//! * PWM timer: TIM1 with TIM8 in step, one period per carrier half; [`legs`] says how a half is played and which registers are shadowed, [`half`]
+//!   how it becomes compare values, [`dead_time`] how the dead time is coded.
 //! * Control timer: TIM3, started by TIM1's first update, so that both count from one instant.
-//! * Both timers' clocks are 170 MHz divided by [`PRESCALER`]: 16 bits then hold the longest half. The control rate is the power stage's.
+//! * Both timers' clocks are 170 MHz divided by [`PRESCALER`], so that 16 bits hold the longest half. The power stage sets the control rate.
 //! * Converters: ADC1 at the control timer's update, ADC2 at the PWM timer's ([`sampling`]). Position: an encoder on
 //!   TIM4, or whatever implements [`Position`].
-//! * Break inputs and comparators turn the gates off without clock and software ([`comparators`]); the watchdog
-//!   does when an interrupt stops coming ([`watchdog`]).
+//! * Break inputs and comparators turn the gates off without clock and software ([`comparators`]); the watchdog turns them off when an interrupt
+//!   stops coming ([`watchdog`]).
 //! * [`zs9`] is the same for the nine-switch inverter.
 //! * [`pins`] is the wiring, [`power_stage`] the scales, [`mod@start`] the order of the start.
 //!

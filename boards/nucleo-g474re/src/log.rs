@@ -1,29 +1,29 @@
-//! The log of the idle loop: a fault when it comes and when it is acknowledged, and after it the flight recorder's records.
+//! The log of the idle loop: a fault when it occurs and when it is acknowledged, followed by the flight recorder's records.
 
 use tractive::cell::{Ring, Words};
 use tractive::protection::Trip;
 use tractive::recorder::{DualRecord, Record};
 
-/// The part that has been told so far.
+/// The part that has been logged so far.
 #[derive(Default)]
 pub struct Log {
     trip: Option<Trip>,
     records: usize,
 }
 
-/// A control period that a log can tell.
+/// A control period that a log can print.
 pub trait LogLine {
     /// In one line.
     fn tell(&self);
 }
 
 impl Log {
-    /// Nothing told yet.
+    /// Nothing logged yet.
     pub const fn new() -> Self {
         Self { trip: None, records: 0 }
     }
 
-    /// Tells the next one of a frozen recorder's records: one a call, because a log that nobody hurries to read holds few.
+    /// Logs the next record of a frozen recorder: one a call, because a log that is read slowly holds few.
     pub fn record<T: LogLine + Words<N>, const N: usize, const RECORDS: usize>(
         &mut self,
         recorder: &Ring<T, N, RECORDS>,
@@ -38,7 +38,7 @@ impl Log {
         }
     }
 
-    /// Tells a fault when it comes, and that it is gone.
+    /// Logs a fault when it occurs and when it is gone.
     pub fn trip(&mut self, trip: Option<Trip>) {
         if trip == self.trip {
             return;

@@ -1,7 +1,7 @@
 //! The PMaSynRM firmware on the NUCLEO-G474RE: two interrupts and an idle loop, nothing else.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-/// The image runs on the board; on the host it names the command that brings it there.
+/// On the board the image runs; on the host it prints the command that flashes it.
 #[cfg(not(target_os = "none"))]
 fn main() {
     println!("This is the firmware. `cargo xtask flash` builds it for its board and flashes it.");
@@ -31,7 +31,7 @@ mod firmware {
         POWER_STAGE.settings(&BUILT_IN.ratings)
     }
 
-    // The build script has said so already, by name: a machine with which the drive would not start makes no image.
+    // The build script has already reported this by name: no image is built for a machine with which the drive would not start.
     const _: () = assert!(settings().check(&BUILT_IN).is_ok());
 
     #[entry]
@@ -39,7 +39,7 @@ mod firmware {
         board::idle(start().err())
     }
 
-    /// Starts the drive; the error is why it is refused.
+    /// Starts the drive; the error says why the start is refused.
     fn start() -> Result<(), FailedCheck> {
         let found = board::prepare(settings().devices).map_err(|error| error.failed())?;
         CONTROL_ZEROS.keep(found.control_zeros);
@@ -48,7 +48,7 @@ mod firmware {
         Ok(())
     }
 
-    /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
+    /// Deadline: the next control interrupt. If missed: fault `control_deadline`, gates into the safe state.
     #[interrupt]
     fn TIM3() {
         static mut BOARD: Option<Control<'static, Sensor>> = None;
@@ -64,7 +64,7 @@ mod firmware {
         nucleo_g474re::complete_stores();
     }
 
-    /// Deadline: the next carrier boundary, where the shadow registers take over. Missed: a break, gates off for good.
+    /// Deadline: the next carrier boundary, where the shadow registers take over. If missed: a break, gates off for good.
     #[interrupt]
     fn TIM1_UP_TIM16() {
         static mut BOARD: Option<Pwm> = None;

@@ -1,8 +1,8 @@
 //! The main outputs of the PWM timers, switched together.
 //!
-//! MOE alone switches a timer's outputs on and off; off, all its gates are driven low (OSSI = 1, OIS = 0), whatever the compares
-//! say. A break clears MOE without clock or software and sets BIF, and BIF, which nothing clears, is the latch: while
-//! it is set the outputs are not switched on again. Switching off for good is a break made by software.
+//! MOE alone switches a timer's outputs on and off. When off, all its gates are driven low (OSSI = 1, OIS = 0), whatever the compares say. A break
+//! clears MOE without clock or software and sets BIF. BIF, which nothing clears, is the latch: while it is set the outputs are not switched on again.
+//! Switching off for good is a break made by software.
 
 use super::dead_time::DeadTime;
 use stm32_metapac::timer::{TimAdv, regs, vals};
@@ -10,13 +10,13 @@ use stm32_metapac::timer::{TimAdv, regs, vals};
 /// The sources of a timer's break.
 #[derive(Clone, Copy, Debug)]
 pub struct BreakSources {
-    /// Its BKIN pin is wired: low breaks.
+    /// `true` if its BKIN pin is wired: low breaks.
     pub pin: bool,
     /// Numbers of the comparators that break.
     pub comparators: &'static [usize],
 }
 
-/// On whose account software has broken.
+/// The software cause of a break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
 pub enum SoftwareBreak {
@@ -31,7 +31,7 @@ pub enum SoftwareBreak {
 pub struct Outputs<const N: usize>(pub [TimAdv; N]);
 
 impl<const N: usize> Outputs<N> {
-    /// Break sources, dead time and off levels, which are locked with this write until the next reset. Each timer has its own sources.
+    /// Sets break sources, dead time and off levels; this write locks them until the next reset. Each timer has its own sources.
     pub fn lock(&self, dead_time: DeadTime, sources: [BreakSources; N]) {
         for (timer, sources) in self.0.into_iter().zip(sources) {
             timer.af1().write(|w| {
@@ -52,7 +52,7 @@ impl<const N: usize> Outputs<N> {
         }
     }
 
-    /// Forgets what the break inputs saw before they were wired up. Only for the start, with the outputs off.
+    /// Clears what the break inputs saw before they were wired up. Only for the start, with the outputs off.
     pub fn forget_breaks(&self) {
         for timer in self.0 {
             timer.sr().write_value(regs::SrAdv(0));
@@ -76,7 +76,7 @@ impl<const N: usize> Outputs<N> {
         }
     }
 
-    /// The same on software's own account, which is kept in the last timer's sixth compare: it has no output.
+    /// The same, with the software cause kept in the last timer's sixth compare, which has no output.
     #[inline]
     pub fn trip_by(&self, software: SoftwareBreak) {
         if !self.is_tripped() {
@@ -85,7 +85,7 @@ impl<const N: usize> Outputs<N> {
         self.trip();
     }
 
-    /// On whose account software has broken; `None` where the hardware was first.
+    /// The software cause of a break; `None` if the hardware was first.
     #[inline]
     pub fn software_break(&self) -> Option<SoftwareBreak> {
         match self.0.last()?.ccr6().read().ccr() {
@@ -102,13 +102,13 @@ impl<const N: usize> Outputs<N> {
         }
     }
 
-    /// `true` if the chip's own break was there: crystal, lock-up, memory.
+    /// `true` if the chip's own break occurred: crystal, lock-up, memory.
     #[inline]
     pub fn is_system_break(&self) -> bool {
         self.0.into_iter().any(|timer| timer.sr().read().sbif())
     }
 
-    /// The timers that have latched a break, a bit each from the first on.
+    /// The timers that have latched a break, one bit each from the first on.
     #[inline]
     pub fn broken(&self) -> u16 {
         self.0.into_iter().rev().fold(0, |bits, timer| {
@@ -117,7 +117,7 @@ impl<const N: usize> Outputs<N> {
         })
     }
 
-    /// Forgets a break, outputs off. `false` while the cause lasts, which sets its flag again.
+    /// Clears a break, outputs off. `false` while the cause lasts, because it sets the flag again.
     #[inline]
     pub fn leave(&self) -> bool {
         self.switch_off();
@@ -140,7 +140,7 @@ impl<const N: usize> Outputs<N> {
             return;
         }
         self.set_main_output(true);
-        // A break between the look and the write would be undone by the write; its latch tells.
+        // The write would undo a break that came after the check above; its latch tells.
         if self.is_tripped() {
             self.trip();
         }
@@ -160,7 +160,7 @@ impl<const N: usize> Outputs<N> {
     }
 }
 
-/// Status flags are cleared by writing 0 and left alone by writing 1; of the breaks' flags.
+/// Status flags are cleared by writing 0; writing 1 leaves them alone. Here: the flags of the breaks.
 fn all_but_breaks() -> regs::SrAdv {
     let mut flags = regs::SrAdv(u32::MAX);
     flags.set_bif(0, false);

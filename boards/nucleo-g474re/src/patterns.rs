@@ -1,11 +1,11 @@
-//! The pulse patterns of the PMaSynRM's image: the paper's, or the optimised ones with the feature `optimal`, which a machine whose
-//! `patterns` are "optimal" needs.
+//! The pulse patterns of the PMaSynRM's image: those of the paper, or, with the feature `optimal`, the optimised ones, which a machine needs whose
+//! `patterns` are "optimal".
 
 use tractive::drive::traction::ControlTask;
 use tractive::machine::Machine;
 use tractive::time::Clock;
 
-/// Highest frequency of the free carrier, as a share of the switches'.
+/// Highest frequency of the free carrier, as a share of the switches' frequency.
 pub const FREE_CARRIER_SHARE: f32 =
     if cfg!(feature = "optimal") { tractive::modulation::FREE_CARRIER_SHARE } else { 1.0 };
 

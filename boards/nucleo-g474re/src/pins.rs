@@ -1,4 +1,4 @@
-//! The pins and their purposes: the one table, from which the pins are configured and with which the documentation is compared.
+//! The pins and their purposes: the one table from which the pins are configured and with which the documentation is compared.
 
 use super::registers::Registers;
 use stm32_metapac::gpio::Gpio;
@@ -44,7 +44,7 @@ pub struct Pin {
     pub function: Function,
     /// The chip's names of what it is connected to.
     pub signals: &'static [&'static str],
-    /// The wire at it.
+    /// The wire connected to it.
     pub purpose: &'static str,
 }
 
@@ -58,7 +58,7 @@ pub(super) const fn pin(
     Pin { port, number, function, signals, purpose }
 }
 
-/// Every pin the PMaSynRM's drive uses, but for those of its [position sensor](super::Position::PINS).
+/// Every pin that the PMaSynRM's drive uses, except those of its [position sensor](super::Position::PINS).
 pub const PINS: [Pin; 26] = [
     pin(Port::A, 8, Function::Gate(6), &["TIM1_CH1"], "gate U, upper device"),
     pin(Port::B, 13, Function::Gate(6), &["TIM1_CH1N"], "gate U, lower device"),
@@ -125,7 +125,7 @@ impl Wire {
         self.port.of(registers)
     }
 
-    /// Sets an output, by a write that touches no other pin.
+    /// Sets an output with a write that touches no other pin.
     pub(super) fn set(self, registers: &Registers, high: bool) {
         let (port, number) = (self.port.of(registers), self.number);
         port.bsrr().write(|w| if high { w.set_bs(number, true) } else { w.set_br(number, true) });
@@ -139,7 +139,7 @@ pub(super) const CHOPPER_OFF: u16 = 0;
 const DRIVERS_READY: usize = 12;
 const DRIVERS_READY_W: usize = 6;
 
-/// `true` if the gate drivers say at both break inputs that they are ready.
+/// `true` if the gate drivers signal at both break inputs that they are ready.
 #[inline]
 pub fn drivers_ready(registers: &Registers) -> bool {
     is_high(registers.gpiob, DRIVERS_READY) && is_high(registers.gpioa, DRIVERS_READY_W)
@@ -149,7 +149,7 @@ pub fn drivers_ready(registers: &Registers) -> bool {
 const ENABLE: usize = 2;
 
 impl Port {
-    /// Its registers.
+    /// The port's registers.
     pub const fn of(self, registers: &Registers) -> Gpio {
         match self {
             Self::A => registers.gpioa,
@@ -177,22 +177,22 @@ pub fn configure_inputs(registers: &Registers, pins: &[Pin]) {
     pins.iter().filter(|pin| !pin.is_gate() && !pin.is_bus()).for_each(|pin| configure(registers, pin));
 }
 
-/// Gives a bus its pins, when its controller rests.
+/// Gives a bus its pins, while its controller is at rest.
 pub fn configure_bus(registers: &Registers, pins: &[Pin]) {
     pins.iter().filter(|pin| pin.is_bus()).for_each(|pin| configure(registers, pin));
 }
 
-/// Gives the gates' pins to the timers, which drive them low as long as their outputs are off. Until then the pins float, as
-/// after a reset: each gate driver needs a pull-down of its own.
+/// Gives the gates' pins to the timers, which drive them low as long as their outputs are off. Until then the pins float, as after a reset: each gate
+/// driver needs its own pull-down.
 pub fn configure_gates(registers: &Registers, pins: &[Pin]) {
     pins.iter().filter(|pin| pin.is_gate()).for_each(|pin| configure(registers, pin));
 }
 
-/// Takes the switches' pins from software for good: inputs with pull-down, as the external pull-downs have them after a reset, so that
-/// nothing that is commanded later reaches what they switch.
+/// Takes the switches' pins from software for good: they become inputs with pull-down, as the external pull-downs hold them after a reset, so that no
+/// later command reaches what they switch.
 pub fn release_switches(registers: &Registers, pins: &[Pin]) {
     for pin in pins.iter().filter(|pin| pin.function == Function::Switch) {
-        // A port has sixteen pins: nothing that could panic where the program dies.
+        // A port has sixteen pins: nothing here may panic, because the program is about to stop.
         let (port, number) = (pin.port.of(registers), usize::from(pin.number & 15));
         port.pupdr().modify(|w| w.set_pupdr(number, Pupdr::PULL_DOWN));
         port.moder().modify(|w| w.set_moder(number, Moder::INPUT));

@@ -26,7 +26,7 @@ pub struct Control<'a, P> {
 }
 
 impl<'a, P: Position> Control<'a, P> {
-    /// With the zeros that the start measured, and where the position sensor's word of itself is kept.
+    /// Made with the zeros that the start measured, and the place where the position sensor's state is kept.
     pub const fn new(registers: Registers, zeros: Zeros, position: P, state: &'a PositionState) -> Self {
         Self {
             registers,
@@ -43,13 +43,13 @@ impl<P: Position> ControlPort for Control<'_, P> {
     fn begin(&mut self, revises: bool) {
         self.timer.acknowledge();
         if revises {
-            // Between two boundaries, at once; on the host nothing comes.
+            // Triggered at once, between two boundaries; on the host nothing happens.
             #[cfg(target_os = "none")]
             super::revise_pulses();
         }
     }
 
-    /// Position first: it has been captured, and the conversions are still under way.
+    /// The position comes first: it has been captured, while the conversions are still under way.
     fn sample(&mut self, _now: Instant) -> Sample {
         let angle = self.position.angle();
         let lost = self.position.is_lost();
@@ -95,9 +95,9 @@ pub struct Pwm {
     registers: Registers,
     sampler: Sampler,
     zeros: Zeros,
-    /// `true` if the half that comes next has pulses.
+    /// `true` if the next half has pulses.
     pulses: bool,
-    /// The levels on which the legs stand at its end.
+    /// The levels of the legs at its end.
     levels: [bool; 3],
 }
 
@@ -108,26 +108,26 @@ impl Pwm {
         Self { registers, sampler, zeros, pulses: false, levels: [false; 3] }
     }
 
-    /// First thing in the interrupt: whether it is a carrier boundary's. If not, control wants a revision, and there is nothing to
+    /// First step in the interrupt: `true` if it belongs to a carrier boundary. If not, control wants a revision, and there is nothing to
     /// acknowledge.
     #[inline]
     pub fn is_boundary(&self) -> bool {
         self.registers.legs.has_updated()
     }
 
-    /// First thing at a boundary.
+    /// First step at a boundary.
     #[inline]
     pub fn acknowledge(&mut self) {
         self.registers.legs.acknowledge();
     }
 
-    /// Second thing: the half that was preloaded last has just begun. Levels and toggles are the timers' own doing; only the
-    /// outputs as a whole are switched on in a first half with pulses and off after the last.
+    /// Second step: the half that was preloaded last has just begun. The timers themselves produce levels and toggles; only the outputs as a whole
+    /// are switched on in a first half with pulses and off after the last.
     #[inline]
     pub fn begin_half(&mut self) {
         let legs = &self.registers.legs;
         if legs.is_tripped() {
-            // A break of one timer alone stops the other.
+            // A break of one timer alone stops the other, too.
             legs.trip();
         } else if self.pulses {
             if !legs.is_on() {
@@ -153,7 +153,7 @@ impl PwmPort for Pwm {
         currents_a(self.sampler.read(), &self.zeros)
     }
 
-    /// An interrupt that ends after its half has left the timers a mixture of two halves: the gates go off.
+    /// If the interrupt ends after its half, the timers hold a mixture of two halves: the gates go off.
     fn play(&mut self, _now: Instant, next: &CarrierHalf) {
         let half = HalfRegisters::new(next, self.levels);
         let legs = &self.registers.legs;
@@ -182,7 +182,7 @@ impl PwmPort for Pwm {
 fn enter(registers: &Registers, safe: SafeState) {
     match safe {
         _ if registers.legs.is_short_circuited() => {}
-        // Nothing here tells of a leg stuck at the upper rail.
+        // No signal here reports a leg stuck at the upper rail.
         SafeState::GatesOff | SafeState::UpperShortCircuit => registers.legs.trip_by(SoftwareBreak::Drive),
         SafeState::ShortCircuit => registers.legs.short_circuit(),
     }

@@ -20,22 +20,22 @@ use tractive::time::Clock;
 pub struct PowerStage {
     /// Control interrupts per second, in Hz.
     pub control_hz: u32,
-    /// Least time between one device of a leg going off and the other going on, in ns.
+    /// Least time between the turn-off of one device of a leg and the turn-on of the other, in ns.
     pub dead_time_ns: u32,
     /// Shortest pulse or pause of a device, dead time included, in ns.
     pub min_pulse_ns: u32,
     /// Current sensors: A per code of the 12-bit converter; positive into the machine.
     pub current_a_per_code: f32,
-    /// Code at no current, nominally; what is measured at start is used, and may differ by [`Self::zero_tolerance`].
+    /// Code at no current, nominally; the code measured at the start is used, and may differ by [`Self::zero_tolerance`].
     pub zero_code: u16,
     /// Farthest that a measured zero may lie from the nominal one, in codes.
     pub zero_tolerance: u16,
     /// Link voltage divider: V per code; code 0 is 0 V.
     pub udc_v_per_code: f32,
-    /// Phase current, of either sign, at which the comparators turn the gates off, in A. Above the drive's own trip level,
-    /// so that a fault that software can still catch has its name.
+    /// Phase current, of either sign, at which the comparators turn the gates off, in A. It lies above the drive's own trip level, so that a fault
+    /// which software can still catch gets its name.
     pub break_current_a: f32,
-    /// Counts of the position sensor in a mechanical turn: of an encoder four times its lines, 4 ..= 65,536.
+    /// Counts of the position sensor per mechanical turn: for an encoder four times its lines, 4 ..= 65,536.
     pub encoder_counts: u32,
     /// Electrical angle of the d axis at the encoder's index, or where the sensor says 0.
     pub encoder_zero: Angle,
@@ -43,13 +43,13 @@ pub struct PowerStage {
     pub line: LineTimes,
     /// `true` if a choke lies between the line and the link: the drive then damps the link.
     pub behind_line_filter: bool,
-    /// Age of the angle when it is read, in s, which the drive makes up for.
+    /// Age of the angle when it is read, in s, for which the drive compensates.
     pub angle_late_s: f32,
-    /// Time constant of the current sensors' filter, in s, which the drive makes up for.
+    /// Time constant of the current sensors' filter, in s, for which the drive compensates.
     pub current_filter_s: f32,
-    /// Drops of the devices, likewise.
+    /// Drops of the devices, for which the drive compensates, too.
     pub drops: Drops,
-    /// Temperature sensors, and how what they are on warms; `None`: there are none.
+    /// Temperature sensors, and the thermal behaviour of what they are mounted on; `None`: there are none.
     pub thermal: Option<Thermal>,
 }
 
@@ -59,7 +59,7 @@ pub const POWER_STAGE: PowerStage = include!(concat!(env!("OUT_DIR"), "/power_st
 /// Its temperature sensors.
 pub static THERMAL: Option<Thermal> = POWER_STAGE.thermal;
 
-/// The PMaSynRM's clock, of both timers.
+/// The PMaSynRM's clock, for both timers.
 pub const CLOCK: Clock = rates::clock(POWER_STAGE.control_hz);
 
 /// Cycles of the undivided clock in one of its ticks.
@@ -88,7 +88,7 @@ impl PowerStage {
         Settings { angle_late_s, angle_step_rad, current_filter_ticks, drops, iron_share, ..settings }
     }
 
-    /// The dead time for the generator, never shorter than asked for; `None` if it cannot make one.
+    /// The dead time for the generator, never shorter than requested; `None` if the generator cannot make it.
     pub const fn dead_time(&self) -> Option<DeadTime> {
         DeadTime::at_least(ns_to_cycles(self.dead_time_ns))
     }
@@ -99,7 +99,7 @@ impl PowerStage {
         if near { Ok(zero) } else { Err(StartError::CurrentSensor { code: zero.0 }) }
     }
 
-    /// Codes between which the phase currents stay while the comparators are content.
+    /// Codes between which the phase currents stay as long as the comparators do not trip.
     pub fn break_codes(&self) -> (u16, u16) {
         let away = (self.break_current_a / self.current_a_per_code) as u16;
         (self.zero_code.saturating_sub(away), self.zero_code.saturating_add(away).min(4_095))
@@ -117,7 +117,7 @@ impl AdcCode {
         self.above(zero) * POWER_STAGE.current_a_per_code
     }
 
-    /// Codes above another one.
+    /// Number of codes above another one.
     #[inline]
     pub fn above(self, zero: AdcCode) -> f32 {
         (i32::from(self.0) - i32::from(zero.0)) as f32

@@ -8,22 +8,22 @@ use tractive::time::Clock;
 /// The timers' undivided clock, in Hz.
 pub const CORE_HZ: u32 = 170_000_000;
 
-/// Cycles of the undivided clock in a tick of both timers at most: 16 bits then hold the halves of slow carriers.
+/// Most cycles of the undivided clock in a tick of both timers, so that 16 bits hold the halves of slow carriers.
 const COARSEST: u16 = 8;
 
-/// Cycles that the control interrupt takes at most, by the upper bound of `docs/cost.md`.
+/// Most cycles that the control interrupt takes, by the upper bound of `docs/cost.md`.
 pub const CONTROL_CYCLES: u32 = 5_210;
 
-/// Cycles that the control interrupt takes longer where it damps a line filter: its 77 instructions, at two cycles and a little each.
+/// Additional cycles of the control interrupt when it damps a line filter: its 77 instructions, at slightly more than two cycles each.
 pub const DAMPING_CYCLES: u32 = 170;
 
-/// Cycles that the PWM interrupt takes at most, by the same bound.
+/// Most cycles that the PWM interrupt takes, by the same bound.
 pub const PWM_CYCLES: u32 = 590;
 
-/// Share of the processor that both interrupts may take if each were as long as its longest. The rest is the operator's.
+/// Share of the processor that both interrupts may take if each took its longest time. The rest is left for the operator.
 pub const LOAD: f64 = 0.92;
 
-/// Cycles of the undivided clock in a tick of both timers at a control rate, in Hz: as many as divide a control period, up to 8.
+/// Cycles of the undivided clock in a tick of both timers at a control rate, in Hz: the most, up to 8, that divide a control period.
 pub const fn prescaler(control_hz: u32) -> u16 {
     let mut prescaler = COARSEST;
     while !(CORE_HZ / control_hz).is_multiple_of(prescaler as u32) {
@@ -51,8 +51,8 @@ pub const fn cycles_to_ticks(cycles: u32, prescaler: u16) -> u32 {
     cycles.div_ceil(prescaler as u32)
 }
 
-/// The PMaSynRM's settings for this control rate, these times of the power stage and this highest switching frequency of its devices; a link
-/// behind a line filter is damped.
+/// The PMaSynRM's settings for this control rate, these times of the power stage and this highest switching frequency of its devices; if the link is
+/// behind a line filter, it is damped.
 pub const fn settings(
     control_hz: u32,
     min_pulse_ns: u32,

@@ -3,7 +3,7 @@
 use super::legs::Legs;
 use stm32_metapac as pac;
 
-/// Handles to register blocks. They are copied freely; who writes what is said where it is written.
+/// Handles to register blocks. They are copied freely; each place that writes says so.
 #[derive(Clone, Copy)]
 #[allow(missing_docs, reason = "the names are the reference manual's")]
 pub struct Registers {
@@ -20,7 +20,7 @@ pub struct Registers {
     pub legs: Legs,
     /// The ZS9's third leg.
     pub tim20: pac::timer::TimAdv,
-    /// The braking chopper's.
+    /// The braking chopper's timer.
     pub tim17: pac::timer::Tim1chCmp,
     /// The ZS9's control timer.
     pub tim2: pac::timer::TimGp32,
@@ -28,9 +28,9 @@ pub struct Registers {
     pub tim3: pac::timer::TimGp16,
     /// Encoder.
     pub tim4: pac::timer::TimGp16,
-    /// Samples of the control interrupt; with the ZS9 both interrupts'.
+    /// Samples of the control interrupt; with the ZS9 those of both interrupts.
     pub adc1: pac::adc::Adc,
-    /// Samples of the PWM interrupt; with the ZS9 both interrupts'.
+    /// Samples of the PWM interrupt; with the ZS9 those of both interrupts.
     pub adc2: pac::adc::Adc,
     /// The ZS9's inductor current; a resolver's sine.
     pub adc3: pac::adc::Adc,
@@ -50,7 +50,7 @@ pub struct Registers {
 }
 
 impl Registers {
-    /// The chip's.
+    /// The chip's own.
     pub const CHIP: Self = Self {
         rcc: pac::RCC,
         pwr: pac::PWR,

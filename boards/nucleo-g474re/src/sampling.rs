@@ -1,12 +1,12 @@
 //! The converters: injected sequences that a timer's update triggers, and the zeros of the current sensors.
 //!
-//! ADC1 belongs to the control interrupt, ADC2 to the PWM interrupt, so each has samples of its own instant. Each current is wired to two pins,
-//! one a converter: two converters that sample one pin at a time would disturb each other. A sequence's conversions follow each
-//! other within 0.6 µs.
+//! ADC1 belongs to the control interrupt, ADC2 to the PWM interrupt, so each has samples of its own instant. Each current is wired to two pins, one
+//! for each converter: two converters that sample the same pin at the same time would disturb each other. A sequence's conversions follow each other
+//! within 0.6 µs.
 //!
-//! A conversion more than 1 ms after the one before it may be wrong (ES0430). ADC1 converts every 100 µs; ADC2 at carrier boundaries, up to
-//! 2.2 ms apart, so the first conversion of its sequence is thrown away. So are the first of the zeros and the last before the timers
-//! take over.
+//! A conversion more than 1 ms after the previous one may be wrong (ES0430). ADC1 converts every 100 µs; ADC2 converts at carrier boundaries, up to
+//! 2.2 ms apart, so the first conversion of its sequence is thrown away. The same holds for the first conversion of the zeros and the last one before
+//! the timers take over.
 
 use super::power_stage::{AdcCode, PowerStage};
 use super::start::{StartError, Wait};
@@ -19,9 +19,9 @@ use tractive::frames::Abc;
 pub struct Sequence {
     /// Channels, in the order of their conversion.
     pub channels: [u8; 4],
-    /// The number of channels that are converted.
+    /// Number of channels that are converted.
     pub count: u8,
-    /// The number of conversions at the beginning that are thrown away.
+    /// Number of conversions at the beginning that are thrown away.
     pub rejected: usize,
     /// JSQR.JEXTSEL.
     pub trigger: u8,
@@ -30,39 +30,39 @@ pub struct Sequence {
 /// ADC1: currents (PA1, PB0, PB14) and link voltage (PC0) at TIM3's update (its TRGO).
 pub const CONTROL: Sequence = Sequence { channels: [2, 15, 5, 6], count: 4, rejected: 0, trigger: 12 };
 
-/// ADC2: W once for nothing, then the currents (PA7, PC1, PB11) at TIM1's update (its TRGO2).
+/// ADC2: W once as a dummy, then the currents (PA7, PC1, PB11) at TIM1's update (its TRGO2).
 pub const PWM: Sequence = Sequence { channels: [14, 4, 7, 14], count: 4, rejected: 1, trigger: 8 };
 
 /// Core cycles of a conversion: 12.5 cycles to sample and 12.5 to convert, at a quarter of the core's clock.
 pub const CONVERSION_CYCLES: u32 = 100;
 
-/// Conversions that are averaged to find a sensor's zero.
+/// Number of conversions that are averaged to find a sensor's zero.
 const ZERO_SAMPLES: u32 = 64;
 
-/// Looks at the end-of-sequence flag before a sample counts as missing: some 10 µs, several times a sequence's length.
+/// Polls of the end-of-sequence flag before a sample counts as missing: some 10 µs, several times a sequence's length.
 const PATIENCE: u32 = 300;
 
 /// Codes at no current, of U, V, W.
 pub type Zeros = [AdcCode; 3];
 
-/// The zeros that the start measured, for an interrupt that begins with them. Written before the interrupts are unmasked.
+/// The zeros that the start measured, for an interrupt that needs them at its start. Written before the interrupts are unmasked.
 #[derive(Debug)]
 pub struct KeptZeros([AtomicU32; 3]);
 
 impl KeptZeros {
-    /// None yet.
+    /// No zeros yet.
     pub const fn new() -> Self {
         Self([const { AtomicU32::new(0) }; 3])
     }
 
-    /// Keeps them.
+    /// Stores them.
     pub fn keep(&self, zeros: Zeros) {
         for (cell, zero) in self.0.iter().zip(zeros) {
             cell.store(u32::from(zero.0), Ordering::Relaxed);
         }
     }
 
-    /// Those that are kept.
+    /// The stored zeros.
     pub fn kept(&self) -> Zeros {
         self.0.each_ref().map(|cell| AdcCode(cell.load(Ordering::Relaxed) as u16))
     }
@@ -78,7 +78,7 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Out of deep sleep, calibrated, enabled.
+    /// Takes the converter out of deep sleep, calibrates and enables it.
     pub fn prepare(&self, wait: &mut dyn Wait) -> Result<(), StartError> {
         let adc = self.adc;
         adc.cr().write(|w| w.set_deeppwd(false));
@@ -101,7 +101,7 @@ impl Sampler {
         Ok(())
     }
 
-    /// The mean code of each current of a sequence that begins with them, converted on command. The gates are off, so no current flows.
+    /// The mean code of each current, converted on command; the sequence begins with the currents. The gates are off, so no current flows.
     pub fn zeros(&self, stage: &PowerStage, wait: &mut dyn Wait) -> Result<Zeros, StartError> {
         let [a, b, c, _] = self.means(wait)?;
         Ok([stage.check_zero(a)?, stage.check_zero(b)?, stage.check_zero(c)?])
@@ -121,10 +121,10 @@ impl Sampler {
         Ok(sums.map(|sum| AdcCode(((sum + ZERO_SAMPLES / 2) / ZERO_SAMPLES) as u16)))
     }
 
-    /// Converts once on command, for nothing: what the timer starts within 1 ms from now on is right.
+    /// Converts once on command, as a dummy: a conversion that the timer starts within 1 ms from now on is right.
     pub fn refresh(&self, wait: &mut dyn Wait) {
         self.write_sequence(adc::vals::Exten::DISABLED);
-        // Its failure is that of the conversions that follow, which is told.
+        // If it fails, so do the conversions that follow, and that is reported.
         let _ = self.convert(wait);
     }
 
@@ -150,7 +150,7 @@ impl Sampler {
         None
     }
 
-    /// Forgets the conversions that are complete by now.
+    /// Discards the conversions that are complete by now.
     #[inline]
     pub fn forget(&self) {
         self.adc.isr().write(|w| w.set_jeos(true));
@@ -193,7 +193,7 @@ pub fn configure_clock(converters: adccommon::AdcCommon) {
     converters.ccr().write(|w| w.set_ckmode(adccommon::vals::Ckmode::SYNC_DIV4));
 }
 
-/// Currents in A; NaN, which the drive's protection names, where the converter gave nothing.
+/// Currents in A; NaN, which the drive's protection reports by name, if the converter gave nothing.
 #[inline]
 pub fn currents_a(codes: Option<[AdcCode; 4]>, zeros: &Zeros) -> Abc {
     let [za, zb, zc] = *zeros;

@@ -1,4 +1,4 @@
-//! The idle loop's operator: asked over CAN, answered by what the board says of itself.
+//! The idle loop's operator: it gets requests over CAN and answers them with the board's own feedback.
 
 use super::can::Can;
 use super::position::PositionState;
@@ -17,10 +17,10 @@ use tractive::protection::FailedCheck;
 use tractive::protocol::{CanEndpoint, Frame};
 use tractive::time::Instant;
 
-/// Frames kept for a slot: more than the bus can carry in its millisecond, which are 4.5 of eight bytes, 10.6 without one.
+/// Frames stored for a slot: more than the bus can carry in its millisecond (4.5 with eight bytes, 10.6 without data).
 const INBOX: usize = 12;
 
-/// The operator's side of the board, over a protocol's station.
+/// The operator's side of the board, with a protocol's station.
 pub struct Serve<'a, S = CanEndpoint> {
     pub(crate) registers: Registers,
     /// The bus.
@@ -29,7 +29,7 @@ pub struct Serve<'a, S = CanEndpoint> {
     pub station: S,
     position: &'a PositionState,
     configuration: Configuration,
-    /// Frames that have come since the last slot, and how many.
+    /// Frames that have come since the last slot, and their number.
     inbox: [Frame; INBOX],
     waiting: usize,
     /// The temperature sensors.
@@ -37,7 +37,7 @@ pub struct Serve<'a, S = CanEndpoint> {
 }
 
 impl<'a, S> Serve<'a, S> {
-    /// At power-up; the configuration has been checked, or not.
+    /// At power-up; the configuration has been checked or has failed.
     pub fn new(
         registers: Registers,
         can: Can,
@@ -66,15 +66,15 @@ impl<'a, S> Serve<'a, S> {
             main_closed,
             driver_ready: pins::drivers_ready(&self.registers),
             position_known: self.position.is_known(),
-            // An incremental encoder cannot tell at standstill; while it turns, it looks at its index, and the drive at its angle.
+            // An incremental encoder cannot tell at standstill; while it turns, it checks its index, and the drive checks its angle.
             sensor_alive: !self.position.is_lost(),
             configuration: self.configuration,
-            // No offsets: the start has refused sensors whose zero is too far off, and taken the rest away.
+            // No offsets: the start has refused sensors whose zero is too far off, and subtracted the zeros of the others.
             ..Feedback::default()
         }
     }
 
-    /// Empties the controller's FIFO, which holds three frames, into the inbox. Called in every pass of the idle loop.
+    /// Empties the controller's FIFO, which holds three frames, into the inbox. Called on every pass of the idle loop.
     pub(crate) fn collect(&mut self) {
         let room = self.inbox.get_mut(self.waiting..).unwrap_or_default();
         self.waiting += self.can.receive(room);
@@ -95,9 +95,9 @@ impl<'a, S> Serve<'a, S> {
 
 /// The PMaSynRM drive's end of the protocol.
 pub trait Station {
-    /// The operator's settings with the parameters that are in force.
+    /// The operator's settings with the parameters in force.
     fn settings<'a>(&self, settings: &Settings<'a>) -> Settings<'a>;
-    /// The request in a slot, `slots` after the last one, after the frames that have come since.
+    /// The request in a slot, `slots` after the last one, given the frames that have come since.
     fn listen(&mut self, slots: u32, frames: impl Iterator<Item = Frame>) -> Request;
     /// The frame to send after the slot, if one is due.
     fn tell(&mut self, status: &Status, report: Option<&Report>) -> Option<Frame>;
@@ -117,7 +117,7 @@ impl Station for CanEndpoint {
     }
 }
 
-/// The same with the frames of what an identification keeps, where the drive's leave room.
+/// The same, with additional frames of what an identification stores, where the drive's frames leave room.
 pub struct Identifying<'a> {
     drive: CanEndpoint,
     teller: Teller,
@@ -157,21 +157,21 @@ impl<S: Station> Serve<'_, S> {
         }
     }
 
-    /// A pass of the idle loop: takes what has come, and does the newest slot if it is not done yet. Says whether it did one.
+    /// One pass of the idle loop: takes the frames that have come, and serves the newest slot if not yet served. Says whether it served one.
     pub fn pass(&mut self, slot: &mut Slot, mailboxes: &OperatorMailboxes, rated: &Settings) -> bool {
         self.collect();
         let settings = self.station.settings(rated);
         slot.run(mailboxes, self, &settings, &CLOCK)
     }
 
-    /// The same where the start was refused, and `why`; once in a slot's time.
+    /// The same if the start was refused, with `why`; once in a slot's time.
     pub fn refuse(&mut self, slot: &mut Slot, why: FailedCheck, rated: &Settings) {
         self.collect();
         slot.refuse(why, self, rated, &CLOCK);
     }
 }
 
-/// The switches at once: a slot earlier or later is nothing to a contactor, and the chopper's compare is preloaded.
+/// Sets the switches at once: a slot earlier or later does not matter to a contactor, and the chopper's compare is preloaded.
 impl<S: Station> OperatorPort<TorqueDemand> for Serve<'_, S> {
     fn ask(&mut self, _at: Instant, slots: u32) -> (Request, Feedback) {
         if THERMAL.is_some() {

@@ -1,4 +1,4 @@
-//! The start: what is configured, in which order. The gates stay off until all of it is done.
+//! The start: the configuration steps and their order. The gates stay off until all of it is done.
 
 use super::comparators;
 use super::control_timer::ControlTimer;
@@ -14,7 +14,7 @@ pub use super::wait::{Timeout, Wait};
 use super::{CLOCK, PRESCALER, clock, switchgear, temperatures, watchdog};
 use tractive::modulation::SwitchLimits;
 
-/// The findings of the start.
+/// The results of the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Found {
     /// Zeros of the control interrupt's converter.
@@ -40,8 +40,8 @@ pub struct Start<'a> {
 /// One step of the start.
 pub type Step = fn(&mut Start) -> Result<(), StartError>;
 
-/// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is theirs,
-/// and break inputs and comparators watch before that; nothing counts until [`run`].
+/// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is connected to them, and break inputs and
+/// comparators are active before that; nothing counts until [`run`].
 pub const STEPS: [(&str, Step); 13] = [
     ("dead-battery pull-downs", |start| {
         clock::release_dead_battery(start.registers, start.wait);
@@ -52,7 +52,7 @@ pub const STEPS: [(&str, Step); 13] = [
         clock::enable_peripherals(start.registers, start.wait);
         Ok(())
     }),
-    // Not earlier: what is refused is told over the bus, which needs the crystal and its pins.
+    // Not earlier: a refusal is reported over the bus, which needs the crystal and its pins.
     ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("inputs", |start| {
         pins::configure_inputs(start.registers, &pins::PINS);
@@ -84,7 +84,7 @@ pub const STEPS: [(&str, Step); 13] = [
     ("watchdog", |start| watchdog::start(start.registers, start.wait)),
 ];
 
-/// All steps; after one that fails all outputs are off for good.
+/// Runs all steps; after one that fails all outputs are off for good.
 pub fn prepare(
     registers: &Registers,
     wait: &mut dyn Wait,
@@ -98,8 +98,8 @@ pub fn prepare(
 /// Time for which the start waits for gate drivers that come up later than the chip, in ms.
 const DRIVERS_MS: u32 = 200;
 
-/// Forgets what the break inputs saw before they were wired up. A driver that is not ready by the end is a fault of the drive as it is later
-/// on: its latch holds the gates until it is acknowledged.
+/// Clears what the break inputs saw before they were wired up. A driver that is not ready by the end is a fault of the drive, as it would be later:
+/// its latch keeps the gates off until it is acknowledged.
 pub(super) fn settle_breaks<const N: usize>(outputs: &Outputs<N>, wait: &mut dyn Wait) {
     for _ in 0..DRIVERS_MS {
         outputs.forget_breaks();
@@ -113,14 +113,14 @@ pub(super) fn settle_breaks<const N: usize>(outputs: &Outputs<N>, wait: &mut dyn
 
 /// Switches off for good, until the next reset, whatever is commanded: all gates, the chopper, and what these pins switch.
 pub fn switch_off(registers: &Registers, pins: &[Pin]) {
-    // All timers that may have gates, of whichever drive.
+    // All timers that may have gates, of either drive.
     Outputs([registers.legs.tim1, registers.legs.tim8, registers.tim20]).trip();
     switchgear::stop_chopper(registers);
     pins::release_switches(registers, pins);
 }
 
-/// Both timers count from this instant on; from their next updates on the converters follow them. Everything must be
-/// prepared, and the interrupts be ready.
+/// Both timers count from this instant on; the converters follow them from their next updates on. Everything must be prepared, and the interrupts
+/// ready.
 pub fn run(registers: &Registers, wait: &mut dyn Wait) {
     let samplers = [control_sampler(registers), pwm_sampler(registers)];
     samplers.iter().for_each(|sampler| sampler.refresh(wait));

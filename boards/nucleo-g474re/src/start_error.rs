@@ -6,7 +6,7 @@ use tractive::protection::{FailedCheck, Fault};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum StartError {
-    /// The watchdog has reset the chip. The drive does not start again by itself: the next reset, by hand, starts it.
+    /// The watchdog has reset the chip. The drive does not restart by itself: the next manual reset starts it.
     WatchdogReset,
     /// The flash memory did not take the wait states.
     FlashLatency,
@@ -16,7 +16,7 @@ pub enum StartError {
     Pll,
     /// The system clock was not switched to the PLL.
     ClockSwitch,
-    /// The dead time is none or longer than the generator can make.
+    /// The dead time is zero or longer than the generator can make.
     DeadTime,
     /// A carrier half may be longer than the 16-bit timers count.
     Carrier {
@@ -39,7 +39,7 @@ pub enum StartError {
 }
 
 impl StartError {
-    /// The fault that a drive tells which was refused to start for this: [`Fault::StartRefused`], and the reason's number.
+    /// The fault that a drive reports if it was refused to start for this reason: [`Fault::StartRefused`], and the reason's number.
     pub const fn failed(&self) -> FailedCheck {
         let number = match self {
             Self::WatchdogReset => 1.0,

@@ -1,8 +1,8 @@
 //! Contactors, discharge resistor and braking chopper.
 //!
-//! Relays and contactors are plain outputs, high to close, with an input each for their auxiliary contacts. The chopper is TIM17's
-//! channel 1, edge-aligned, 1 kHz: one period an operator's slot. Its compare is preloaded, so a duty holds for whole periods. Its main
-//! output works as the gates' ([`super::outputs`]): off, the pin is driven low, and the chip's own break switches it off.
+//! Relays and contactors are plain outputs, high to close, each with an input for its auxiliary contact. The chopper is TIM17's channel 1,
+//! edge-aligned, 1 kHz: one period per operator slot. Its compare is preloaded, so a duty holds for whole periods. Its main output works as those of
+//! the gates do ([`super::outputs`]): when off, the pin is driven low, and the chip's own break switches it off.
 
 pub use super::pins::Wires;
 use super::pins::{self, CHOPPER_OFF, Wire, is_high};
@@ -16,7 +16,7 @@ pub const CHOPPER_COUNTS: u16 = 1_000;
 /// Chopper periods per second, in Hz.
 const CHOPPER_HZ: u32 = 1_000;
 
-/// Outputs low, the chopper off and counting. Its pin is still an input then.
+/// Sets the outputs low, the chopper off and counting. The chopper's pin is still an input then.
 pub fn configure(registers: &Registers) {
     let timer = registers.tim17;
     timer.psc().write_value((CORE_HZ / CHOPPER_HZ / u32::from(CHOPPER_COUNTS) - 1) as u16);
@@ -48,16 +48,16 @@ pub fn stop_chopper(registers: &Registers) {
     registers.tim17.bdtr().modify(|w| w.set_moe(false));
 }
 
-/// Sets all of them. From the idle loop only.
+/// Sets all switches. From the idle loop only.
 pub fn set(registers: &Registers, switches: &Switches) {
     set_wires(registers, &pins::SWITCHGEAR, switches);
     registers.tim17.ccr(0).write(|w| w.set_ccr(counts(switches.chopper)));
 }
 
-/// The same of any system, without a chopper.
+/// The same for any system, without a chopper.
 pub fn set_wires(registers: &Registers, of: &Wires, switches: &Switches) {
     let Switches { precharge, main, discharge, .. } = *switches;
-    // What opens before what closes: a contactor is never still told to be closed when the discharge resistor goes on.
+    // What opens comes before what closes: a contactor is never still commanded closed when the discharge resistor goes on.
     let wires = [(of.precharge, precharge), (of.main, main), (of.discharge, discharge)];
     for closes in [false, true] {
         for (wire, _) in wires.iter().filter(|(_, closed)| *closed == closes) {
@@ -66,13 +66,13 @@ pub fn set_wires(registers: &Registers, of: &Wires, switches: &Switches) {
     }
 }
 
-/// The auxiliary contacts of precharge relay and main contactor: closed.
+/// `true` for each auxiliary contact, of precharge relay and main contactor, that is closed.
 pub fn contacts(registers: &Registers, of: &Wires) -> (bool, bool) {
     let closed = |wire: Wire| is_high(wire.port(registers), wire.number);
     (closed(of.precharge_contact), closed(of.main_contact))
 }
 
-/// A duty as a compare; what is no number is none.
+/// A duty as a compare; a value that is not a number gives no duty.
 fn counts(duty: f32) -> u16 {
     let counts = duty * f32::from(CHOPPER_COUNTS);
     if counts >= f32::from(CHOPPER_COUNTS) {

@@ -1,10 +1,10 @@
 //! Waiting for the hardware.
 
-/// Time that passes while the hardware works: on the chip a loop with a bound, in a test the hardware's turn.
+/// Time that passes while the hardware works: on the chip a bounded loop, in a test the hardware's turn.
 pub trait Wait {
-    /// Until `done` says so; an error if it does not for too long.
+    /// Waits until `done` returns true; an error if that takes too long.
     fn until(&mut self, done: &mut dyn FnMut() -> bool) -> Result<(), Timeout>;
-    /// At least this long.
+    /// Waits at least this long.
     fn microseconds(&mut self, us: u32);
 }
 

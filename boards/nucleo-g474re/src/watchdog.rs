@@ -5,10 +5,10 @@ use super::start::{StartError, Wait};
 use core::sync::atomic::{AtomicBool, Ordering};
 use stm32_metapac::iwdg;
 
-/// Time without food before the reset, in counts of 32 kHz / 4: 20 ms, several of the slowest carrier halves.
+/// Time without feeding before the reset, in counts of 32 kHz / 4: 20 ms, several of the slowest carrier halves.
 pub const RELOAD: u16 = 160;
 
-/// Starts it, which nothing but a reset stops.
+/// Starts the watchdog; only a reset stops it.
 pub fn start(registers: &Registers, wait: &mut dyn Wait) -> Result<(), StartError> {
     let iwdg = registers.iwdg;
     iwdg.kr().write(|w| w.set_key(iwdg::vals::Key::START));
@@ -20,7 +20,7 @@ pub fn start(registers: &Registers, wait: &mut dyn Wait) -> Result<(), StartErro
     Ok(())
 }
 
-/// An error if the watchdog was the last to reset the chip; told once.
+/// An error if the watchdog caused the last reset of the chip; reported once.
 pub fn refuse_after_bite(registers: &Registers) -> Result<(), StartError> {
     let bitten = registers.rcc.csr().read().iwdgrstf();
     registers.rcc.csr().modify(|w| w.set_rmvf(true));
@@ -39,7 +39,7 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// Neither.
+    /// Neither has run.
     pub const fn new() -> Self {
         Self { control: AtomicBool::new(false), pwm: AtomicBool::new(false) }
     }
@@ -56,7 +56,7 @@ impl Pulse {
         self.pwm.store(true, Ordering::Relaxed);
     }
 
-    /// In the idle loop: feeds the watchdog if both have run since the last time, and says so.
+    /// Called in the idle loop: feeds the watchdog if both have run since the last time, and says so.
     pub fn feed_if_both_ran(&self, registers: &Registers) -> bool {
         let both = self.control.load(Ordering::Relaxed) && self.pwm.load(Ordering::Relaxed);
         if both {

@@ -29,7 +29,7 @@ impl Figures {
         figures.set("fault", name_of(trip));
         if let Some(trip) = trip {
             figures.set("fault_value", trip.value);
-            // What is no number breaks any limit.
+            // A value that is not a number violates any limit.
             if trip.limit < f32::MAX {
                 figures.set("fault_limit", trip.limit);
             }
@@ -48,7 +48,7 @@ impl Figures {
         self.0.get(name)
     }
 
-    /// A figure that is a number; nothing where it is none.
+    /// A figure that is a number; `None` otherwise.
     pub fn number(&self, name: &str) -> Option<f64> {
         self.get(name).and_then(Value::as_f64)
     }
@@ -58,7 +58,7 @@ impl Figures {
         &self.0
     }
 
-    /// `true` if one of the verdicts says that a bound is not kept.
+    /// `true` if one of the verdicts says that a bound is violated.
     pub fn fall_short(&self) -> bool {
         let verdicts = self.get("verdicts").and_then(Value::as_array);
         verdicts.is_some_and(|verdicts| verdicts.iter().any(|one| one["verdict"] == FALLS_SHORT))
@@ -93,14 +93,14 @@ pub fn window(recording: &Recording, from_s: f64, to_s: f64) -> &[Row] {
     between(&recording.rows, from_s, to_s)
 }
 
-/// Half the excursion of the link in some rows, as a share of its voltage.
+/// Half the peak-to-peak swing of the link in some rows, as a share of its voltage.
 pub fn link_swing(rows: &[Row]) -> f64 {
     let links = || rows.iter().map(|row| row.udc_v);
     let (low_v, high_v) = (links().fold(f64::INFINITY, f64::min), links().fold(0.0, f64::max));
     (high_v - low_v) / (high_v + low_v)
 }
 
-/// The largest number of times that any one device turns on in any window of this length.
+/// The largest number of turn-ons of any one device in any window of this length.
 pub fn most_turn_ons(recording: &Recording, length_s: f64) -> usize {
     let length = (length_s / recording.tick_s).round() as u64;
     (0..6)
@@ -146,7 +146,7 @@ fn carrier_averaged(
         .collect()
 }
 
-/// The rows of a window at constant speed, shortened to whole turns of the stator field where one fits.
+/// The rows of a window at constant speed, shortened to whole turns of the stator field if one fits.
 pub fn whole_turns(recording: &Recording, (from_s, to_s): (f64, f64), pole_pairs: u32) -> &[Row] {
     let rows = window(recording, from_s, to_s);
     let speed_rpm = rows.last().map_or(0.0, |row| row.speed_rpm);

@@ -15,39 +15,39 @@ pub struct SteadyPoint {
     pub speed_rpm: f64,
     /// Torque demanded, in N·m.
     pub demand_nm: f64,
-    /// The torque that the drive says it gives of it, in N·m: less where current or voltage do not allow more.
+    /// The torque that the drive reports as its reference, in N·m: less than the demand if current or voltage do not allow more.
     pub reference_nm: f64,
     /// Mean air-gap torque, in N·m.
     pub torque_nm: f64,
-    /// The torque that the drive tells of it, mean, in N·m.
+    /// Mean of the torque that the drive reports as its actual one, in N·m.
     pub told_nm: f64,
-    /// The largest distance of that from the true mean, in percent of the largest torque.
+    /// The largest deviation of that from the true mean, in percent of the largest torque.
     pub told_error_percent: f64,
-    /// Its error, in percent of the demand, or of 2 % of the largest torque where that is more.
+    /// Error of the mean torque, in percent of the demand, or of 2 % of the largest torque if that is more.
     pub torque_error_percent: f64,
-    /// Its error, in the same way of what the drive says.
+    /// Its error in the same way, relative to the drive's reported reference.
     pub reference_error_percent: f64,
     /// Phase current, rms, in A.
     pub current_rms_a: f64,
     /// Peak to peak torque ripple, in N·m.
     pub torque_ripple_nm: f64,
-    /// Power that comes out over power that goes in, with the machine folder's speed-dependent loss, in percent: shaft over electrical while
-    /// motoring, electrical over shaft while braking; nothing where all that goes in is lost.
+    /// Output power over input power, with the machine folder's speed-dependent loss, in percent: shaft over electrical while motoring, electrical
+    /// over shaft while braking; `None` if all of the input is lost.
     pub efficiency_percent: Option<f64>,
     /// Mode in use at the end.
     pub mode: &'static str,
 }
 
-/// Share of the largest torque below which an error is no longer one of the torque wanted, but of this.
+/// Share of the largest torque below which an error is no longer related to the torque wanted, but to this share.
 const LEAST_SHARE: f64 = 0.02;
 
-/// The error of a torque, in percent of the one wanted; positive where its magnitude is too large.
+/// The error of a torque, in percent of the one wanted; positive if its magnitude is too large.
 fn error_percent(torque_nm: f64, wanted_nm: f64, largest_nm: f64) -> f64 {
     let of_nm = wanted_nm.abs().max(LEAST_SHARE * largest_nm);
     (torque_nm - wanted_nm) * wanted_nm.signum() / of_nm * 100.0
 }
 
-/// The efficiency in percent, of the powers at the shaft and at the terminals.
+/// The efficiency in percent, from the powers at the shaft and at the terminals.
 fn efficiency_percent(shaft_w: f64, electrical_w: f64) -> Option<f64> {
     if shaft_w > 0.0 && electrical_w > 0.0 {
         Some(shaft_w / electrical_w * 100.0)
@@ -95,14 +95,14 @@ pub fn steady_point(
     }
 }
 
-/// The verdict on the mean torque in square wave; nothing where there is none.
+/// The verdict on the mean torque in square wave; `None` if there is no square wave.
 pub fn square_verdict(recording: &Recording, options: &RunOptions, largest_nm: f64) -> Option<Verdict> {
     let error = square_torque_error_percent(recording, largest_nm)?;
     let most = torque_bound(options, 0.5, 1.5);
     Some(Verdict::at_most("mean torque error in square wave in %", error, most))
 }
 
-/// Largest error of the mean torque in square wave over tenths of a second, in percent; nothing without square wave.
+/// Largest error of the mean torque in square wave over tenths of a second, in percent; `None` without square wave.
 fn square_torque_error_percent(recording: &Recording, largest_nm: f64) -> Option<f64> {
     const WINDOW_S: f64 = 0.1;
     let end_s = recording.rows.last().map_or(0.0, |row| row.t_s);

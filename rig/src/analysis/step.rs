@@ -14,7 +14,7 @@ pub struct Step {
     pub from_nm: f64,
     /// Torque after, in N·m.
     pub to_nm: f64,
-    /// Until when the torque holds, in s.
+    /// Time until which the torque holds, in s.
     pub until_s: f64,
     /// Carrier period over which torque is averaged, in s.
     pub carrier_s: f64,
@@ -27,19 +27,19 @@ pub struct StepResponse {
     pub from_nm: f64,
     /// Torque after, in N·m.
     pub to_nm: f64,
-    /// From the step to 90 % of it, in ms.
+    /// Time from the step to 90 % of it, in ms.
     pub t90_ms: f64,
-    /// Beyond the final mean, as a share of the step, in percent: of the averaged torque, as t90 and the settling times are.
+    /// Overshoot beyond the final mean, as a share of the step, in percent: of the averaged torque, like t90 and the settling times.
     pub overshoot_percent: f64,
-    /// Until the torque stays within 5 % of the step about the final mean, in ms.
+    /// Time until the torque stays within 5 % of the step about the final mean, in ms.
     pub settling_5_percent_ms: f64,
-    /// The same with 2 %.
+    /// The same for 2 %.
     pub settling_2_percent_ms: f64,
     /// Mean of the last 40 ms less the demand, in N·m.
     pub final_error_nm: f64,
-    /// Lowest torque itself, ripple included, in the first 10 ms, in N·m.
+    /// Lowest instantaneous torque, ripple included, in the first 10 ms, in N·m.
     pub lowest_nm: f64,
-    /// Highest torque itself in the same time, in N·m.
+    /// Highest instantaneous torque in the same time, in N·m.
     pub highest_nm: f64,
 }
 

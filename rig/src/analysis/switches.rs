@@ -1,4 +1,4 @@
-//! Changes of mode, and whether there are more than there should be.
+//! Changes of mode, and a check for unnecessary ones.
 
 use super::{carrier_averaged, most_turn_ons, window};
 use crate::machine::Machine;
@@ -8,7 +8,7 @@ use crate::verdict::{Verdict, bound, worst};
 use serde::Serialize;
 use tractive::modulation::Mode;
 
-/// The effect of a switch of mode on the current.
+/// The effect of a mode change on the current.
 #[derive(Clone, Debug, Serialize)]
 pub struct SwitchFigures {
     /// The time, in s.
@@ -19,23 +19,23 @@ pub struct SwitchFigures {
     pub to: &'static str,
     /// Mechanical speed, in r/min.
     pub speed_rpm: f64,
-    /// Pulse angle, in degrees; absent where the old carrier was not locked.
+    /// Pulse angle, in degrees; absent if the old carrier was not locked.
     pub pulse_angle_deg: Option<f64>,
     /// Largest |phase current| from 2 ms before to 30 ms after, in A.
     pub peak_current_a: f64,
     /// Larger of the largest |phase current| 100 to 20 ms before and 60 to 140 ms after, in A.
     pub steady_current_a: f64,
-    /// By how much the first exceeds the second, in percent.
+    /// Excess of the first over the second, in percent.
     pub excess_percent: f64,
     /// Torque beyond the steady ripple band of the same windows, from 2 ms before to 30 ms after, in N·m.
     pub torque_excursion_nm: f64,
-    /// The same for torque averaged over 1/900 s. That is not a whole number of ripple periods in every mode, so where the ripple
-    /// changes its shape this shows more than there is.
+    /// The same for torque averaged over 1/900 s. That is not a whole number of ripple periods in every mode, so if the ripple changes its shape the
+    /// value is too large.
     pub averaged_torque_excursion_nm: f64,
-    /// The excess of current with the extremes at every edge of a gate, in percent: what rows see varies by 1 to 2 % from turn to turn at a
-    /// small torque. It is told and not judged.
+    /// The excess of current with the extremes at every gate edge, in percent: the extremes in rows vary by 1 to 2 % from turn to turn at a small
+    /// torque. It is reported and not judged.
     pub edge_excess_percent: f64,
-    /// The excursion of torque with these, in N·m.
+    /// The excursion of torque with these extremes, in N·m.
     pub edge_torque_excursion_nm: f64,
 }
 
@@ -106,7 +106,7 @@ fn excursion(error_nm: impl Fn(f64, f64) -> Vec<f64>) -> f64 {
     (low - during.0).max(during.1 - high).max(0.0)
 }
 
-/// Torque beyond the steady ripple band at most, as a share of the largest.
+/// Largest torque beyond the steady ripple band, as a share of the largest torque.
 const EXCURSION: f64 = 25.0 / 1235.0;
 
 /// The verdicts on every switch of mode.
@@ -118,12 +118,12 @@ pub fn switch_verdicts(
 ) -> Vec<Verdict> {
     let largest_nm = machine.folder.parameters.max_torque_nm;
     let excess = worst(switches.iter().map(|switch| switch.excess_percent));
-    // Of a wrong map it is asked that nothing trips.
+    // With a wrong map the only requirement is that nothing trips.
     let most_excess = if options.map_error == 0.0 { bound(options, 1.5, 3.0) } else { f64::INFINITY };
     let torque_nm = worst(switches.iter().map(|switch| switch.torque_excursion_nm));
     let most_nm = bound(options, EXCURSION * largest_nm, f64::INFINITY);
     let (hunts, turn_ons) = (hunts(recording) as f64, most_turn_ons(recording, 0.1) as f64);
-    // One more than the carriers that there are, a part of one counted as one: turn-ons move within their carriers.
+    // One more than the number of carriers, a fraction of one counted as one: turn-ons move within their carriers.
     let most_turn_ons = (machine.folder.parameters.max_switching_hz / 10.0).ceil() + 1.0;
     let current = "current over the larger steady envelope in %";
     let torque = "torque beyond the steady ripple band in N·m";
@@ -136,8 +136,8 @@ pub fn switch_verdicts(
     ]
 }
 
-/// Switches that take the one before back although neither speed nor demand has come back in between. At the power limit
-/// the demand falls while the speed rises: that is no cause.
+/// Switches that reverse the previous one although neither speed nor demand has gone back in between. At the power limit the demand falls while the
+/// speed rises: that is no cause.
 fn hunts(recording: &Recording) -> usize {
     const SPEED_SHARE: f64 = 0.005;
     const DEMAND_SHARE: f64 = 0.01;
@@ -146,8 +146,8 @@ fn hunts(recording: &Recording) -> usize {
     let without_cause = taken_back.filter(|pair| {
         let between = window(recording, pair[0].t_s, pair[1].t_s);
         let (Some(first), Some(last)) = (between.first(), between.last()) else { return true };
-        // How far each has gone the way that the second switch goes, as a share.
-        // Up the ladder there are fewer and fewer turn-ons; a free carrier, which counts none, is at its foot.
+        // Share by which each has moved in the direction of the second switch. Up the ladder the number of turn-ons decreases; a free carrier, which
+        // counts none, is at its foot.
         let turn_ons = |mode: Mode| mode.turn_ons().wrapping_sub(1);
         let sign = if turn_ons(pair[1].to) < turn_ons(pair[1].from) { 1.0 } else { -1.0 };
         let gone = |value: fn(&Row) -> f64| sign * (value(last) / value(first) - 1.0);

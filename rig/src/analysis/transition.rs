@@ -1,4 +1,4 @@
-//! From one steady state to another, and from coasting to driving.
+//! Transitions from one steady state to another, and from coasting to driving.
 
 use super::window;
 use crate::rows::mean;
@@ -6,7 +6,7 @@ use crate::trace::{Recording, Row};
 use serde::Serialize;
 use tractive::modulation::Mode;
 
-/// The effect of a change on the current, beside the steady states before and after it.
+/// The effect of a change on the current, compared with the steady states before and after it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Transition {
     /// The time, in s.
@@ -23,7 +23,7 @@ pub struct Transition {
     pub steady_current_a: f64,
     /// Ratio of the two.
     pub peak_ratio: f64,
-    /// Mean torque of the last 60 ms less the demand, in N·m.
+    /// Mean torque of the last 60 ms minus the demand, in N·m.
     pub final_error_nm: f64,
 }
 
@@ -57,7 +57,7 @@ pub struct FlyingStart {
     pub first_mode: &'static str,
     /// Mode 30 ms later.
     pub then_mode: &'static str,
-    /// Largest |phase current| in the 20 ms before, in A: of the diodes.
+    /// Largest |phase current| in the 20 ms before, in A: that of the diodes.
     pub coasting_current_a: f64,
     /// Largest |phase current| in the first 30 ms, in A.
     pub catching_current_a: f64,
@@ -67,11 +67,11 @@ pub struct FlyingStart {
     pub catching_torque_nm: f64,
     /// Torque demanded at the end of driving, in N·m.
     pub demand_nm: f64,
-    /// Mean torque of the last 60 ms of driving less that, in N·m.
+    /// Mean torque of the last 60 ms of driving minus that, in N·m.
     pub final_error_nm: f64,
 }
 
-/// Measures a catch at `at_s`, with no torque demanded until 30 ms later, and what the drive gave until `until_s`.
+/// Measures a catch at `at_s`, with no torque demanded until 30 ms later, and the drive's torque until `until_s`.
 pub fn catch(recording: &Recording, (at_s, until_s): (f64, f64), max_current_a: f64) -> FlyingStart {
     const CATCH_S: f64 = 0.03;
     let peak = |rows: &[Row]| rows.iter().map(Row::peak_current_a).fold(0.0, f64::max);

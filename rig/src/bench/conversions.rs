@@ -1,12 +1,12 @@
-//! The exchange between a bench and the control interrupt: samples that wait to be asked for, and reports that show once what they
-//! command takes effect.
+//! The exchange between a bench and the control interrupt: samples that wait until they are asked for, and reports that appear once their commands
+//! take effect.
 
 use super::due::Due;
 use super::{BenchError, Tick, Timeline};
 use std::collections::VecDeque;
 use tractive::time::Instant;
 
-/// Samples on the one way, reports on the other.
+/// Samples in one direction, reports in the other.
 #[derive(Clone, Debug)]
 pub struct Conversions<S, R> {
     samples: VecDeque<(Tick, S)>,
@@ -23,8 +23,8 @@ impl<S, R: Default> Conversions<S, R> {
         Self { samples: VecDeque::new(), next: time.control(), reports: Due::default(), report: R::default() }
     }
 
-    /// A sample is taken now. The report of the period before last must be there, because its command takes effect now; unless control
-    /// does not come.
+    /// A sample is taken now. The report of the period before last must have arrived, because its command takes effect now; unless control does not
+    /// run.
     pub fn begin(&mut self, time: &Timeline, has_control: bool) -> Result<(), BenchError> {
         if self.samples.len() > 1 {
             if has_control {
@@ -36,7 +36,7 @@ impl<S, R: Default> Conversions<S, R> {
         Ok(())
     }
 
-    /// Keeps the sample of this time.
+    /// Stores the sample of this time.
     pub fn put(&mut self, now: Tick, sample: S) {
         self.samples.push_back((now, sample));
     }

@@ -8,11 +8,11 @@ use crate::plant::{FilteredLink, Leg, LineFilter, Plant};
 /// The supply of the inverter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Supply {
-    /// A link whose voltage is what it is told to be.
+    /// A link whose voltage is prescribed.
     Stiff,
-    /// A capacitor, fed from a line that takes back what is braked.
+    /// A capacitor, fed from a line that takes braking energy back.
     Line(LineFilter),
-    /// A link that is somebody else's, whose voltage is told.
+    /// A link that is simulated elsewhere; its voltage is given from outside.
     Shared,
 }
 
@@ -25,7 +25,7 @@ pub struct Terminal {
     pub line_a: f64,
 }
 
-/// The line as a function of time in s: its healthy voltage in V, its fault and for how long that lasts, in s.
+/// The line as a function of time in s: its healthy voltage in V, its fault and the fault's duration, in s.
 pub type LineState = (f64, Option<(SupplyFault, f64)>);
 
 /// The link and what is in front of it.
@@ -34,7 +34,7 @@ pub enum DcSide {
     Stiff,
     /// A capacitor behind a choke.
     Filtered(FilteredLink),
-    /// A link of which only the terminals are here.
+    /// A link of which only the terminals are modelled here.
     Shared(Terminal),
     /// A capacitor behind contactors.
     Operated(Box<LineSide>),
@@ -50,7 +50,7 @@ impl DcSide {
         }
     }
 
-    /// The contactors' side, where there is one.
+    /// The contactors' side, if there is one.
     pub fn operated(&self) -> Option<&LineSide> {
         match self {
             Self::Operated(line) => Some(line),
@@ -66,7 +66,7 @@ impl DcSide {
         }
     }
 
-    /// The link's true voltage, in V, on a healthy line of this one.
+    /// The link's true voltage, in V, for a healthy line of this voltage.
     pub fn udc_v(&self, healthy_v: impl FnOnce() -> f64) -> f64 {
         match self {
             Self::Stiff => healthy_v(),
@@ -76,7 +76,7 @@ impl DcSide {
         }
     }
 
-    /// Current out of the line, in A; `None` where there is no line filter.
+    /// Current out of the line, in A; `None` if there is no line filter.
     pub fn line_a(&self) -> Option<f64> {
         match self {
             Self::Filtered(link) => Some(link.choke_a),
@@ -107,8 +107,8 @@ impl DcSide {
         }
     }
 
-    /// The highest voltage that the link would have over the next tenth of a second without the inverter, in V; `line` is asked for the
-    /// time from now, in s. 0 where nothing but the inverter charges it.
+    /// The highest voltage that the link would have over the next tenth of a second without the inverter, in V; `line` is evaluated at the time from
+    /// now, in s. 0 if only the inverter charges it.
     pub fn unloaded_v(&self, line: impl Fn(f64) -> LineState) -> f64 {
         const STEPS: u32 = 1_000;
         const STEP_S: f64 = 0.1e-3;
@@ -120,7 +120,7 @@ impl DcSide {
     }
 }
 
-/// The target of the line's voltage, in V; `None` where it is cut off.
+/// The target of the line's voltage, in V; `None` if it is disconnected.
 pub(super) fn line_v((healthy_v, fault): LineState) -> Option<f64> {
     match fault {
         None => Some(healthy_v),

@@ -1,4 +1,4 @@
-//! The effects that are due later, in their order.
+//! Effects that are due later, in their order.
 
 use super::Tick;
 use std::collections::VecDeque;
@@ -14,7 +14,7 @@ impl<T> Default for Due<T> {
 }
 
 impl<T> Due<T> {
-    /// One more, later than those before.
+    /// Adds one, later than those before.
     pub fn push(&mut self, at: Tick, value: T) {
         self.0.push_back((at, value));
     }
@@ -24,12 +24,12 @@ impl<T> Due<T> {
         self.0.front().map(|(at, _)| *at)
     }
 
-    /// The last one to come.
+    /// The last one in the queue.
     pub fn last(&self) -> Option<&T> {
         self.0.back().map(|(_, value)| value)
     }
 
-    /// The next one that holds now, taken out.
+    /// Takes out the next one that holds now.
     pub fn take(&mut self, now: Tick) -> Option<T> {
         if self.next()? > now {
             return None;

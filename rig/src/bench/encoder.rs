@@ -1,11 +1,11 @@
-//! An incremental encoder: it counts from where it is switched on, and has no angle before somebody tells it one, or its index passes.
+//! An incremental encoder: it counts from power-up, and has no angle until it is given one or its index passes.
 
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
 use tractive::start_up::axis_error;
 
-/// Share of what an index has shown to be wrong that is left after each sample, as a number of bits: the angle mends in some
-/// hundreds of samples, and nobody sees a step.
+/// Share of an error found at an index that is left after each sample, as a number of bits: the angle is corrected over some hundreds of samples,
+/// without a visible step.
 const MENDING_BITS: u32 = 7;
 
 /// The reading of a position sensor.
@@ -13,7 +13,7 @@ const MENDING_BITS: u32 = 7;
 pub struct Position {
     /// The electrical angle, if it is known.
     pub angle: Option<Angle>,
-    /// The turn since the sensor was switched on, electrical, where it is not.
+    /// The electrical turn since the sensor was switched on, if the angle is not known.
     pub counted: Option<Angle>,
 }
 
@@ -27,32 +27,32 @@ pub struct Encoder {
     /// Angle of the last sample, and of the first.
     last: Option<Angle>,
     first: Angle,
-    /// The angle that the first sample is said to have had.
+    /// The angle that the first sample is stated to have had.
     zero: Option<Angle>,
     indexed: bool,
 }
 
 impl Encoder {
-    /// Of a machine, its rotor so many mechanical turns behind an index, 0 ..= 1, when it is switched on.
+    /// Made for a machine whose rotor is this many mechanical turns after an index, 0 ..= 1, at power-up.
     pub fn new(ratings: &'static Ratings, turns: f64) -> Self {
         let pole_pairs = f64::from(ratings.pole_pairs);
         let turns = turns * pole_pairs;
         Self { ratings, pole_pairs, turns, last: None, first: Angle::ZERO, zero: None, indexed: false }
     }
 
-    /// Electrical turns from the index to where the rotor stood when the encoder was switched on.
+    /// Electrical turns from the index to the rotor's position when the encoder was switched on.
     pub fn turns(&self) -> f64 {
         self.turns
     }
 
-    /// Takes the angle of the first sample from somebody who has found it; returns by how much that is ahead, in degrees: of a machine without magnets but
-    /// for half a turn.
+    /// Takes the angle of the first sample, found by the drive; returns by how many degrees it is ahead: for a machine without magnets, modulo half a
+    /// turn.
     pub fn align(&mut self, zero: Angle) -> f64 {
         self.zero = self.zero.or(Some(zero));
         f64::from(axis_error(self.ratings, zero - self.first).signed()) / 4_294_967_296.0 * 360.0
     }
 
-    /// The reading where the rotor has this angle.
+    /// The reading when the rotor has this angle.
     pub fn read(&mut self, angle: Angle) -> Position {
         let Some(last) = self.last.replace(angle) else {
             self.first = angle;

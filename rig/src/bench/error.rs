@@ -1,12 +1,12 @@
-//! The reasons why a bench cannot go on.
+//! The reasons for which a bench cannot continue.
 
 use crate::plant::zs9::IllegalState;
 use crate::trace::Tick;
 
-/// The firmware broke the protocol, or asked for what an inverter must not have.
+/// The firmware broke the protocol, or asked for something that an inverter must not do.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// The pulses that were played ended and nothing follows.
+    /// The playing pulses ended and nothing follows.
     #[error("at {at_s:.6} s the {what} ended and no next one had been loaded")]
     NothingToPlay {
         /// A carrier half or period.
@@ -26,7 +26,7 @@ pub enum BenchError {
     /// Control fell behind.
     #[error("at {0:.6} s the control interrupt has not reported within its period")]
     ControlLate(f64),
-    /// The gates asked for what the bridge must not have.
+    /// The gates asked for a state that is not allowed for the bridge.
     #[error(transparent)]
     Illegal(#[from] IllegalState),
 }

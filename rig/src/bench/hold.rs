@@ -1,17 +1,17 @@
-//! Sample and hold of the phase currents: each phase at an instant of its own, before the one that all of them are taken for.
+//! Sample and hold of the phase currents: each phase at its own instant, before the nominal instant of the sample.
 
 use super::Tick;
 
 /// The holds of one converter.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Holds {
-    /// Ticks by which each phase is early.
+    /// Number of ticks by which each phase is early.
     early: [Tick; 3],
     held_a: [f64; 3],
 }
 
 impl Holds {
-    /// With each phase early by so many ticks.
+    /// Each phase is early by this many ticks.
     pub fn new(early: [Tick; 3]) -> Self {
         Self { early, held_a: [0.0; 3] }
     }
@@ -34,7 +34,7 @@ impl Holds {
         }
     }
 
-    /// The phase currents of a conversion now: those that were held, and the others as they are.
+    /// The phase currents of a conversion now: the held ones, and the others at their present values.
     pub fn read(&self, now_a: [f64; 3]) -> [f64; 3] {
         core::array::from_fn(|phase| if self.early[phase] > 0 { self.held_a[phase] } else { now_a[phase] })
     }

@@ -8,7 +8,7 @@ use tractive::protection::{LegFaults, SafeState};
 /// The defect of a gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stuck {
-    /// Its order is on for good; its driver still turns the device off where it desaturates.
+    /// Its order is on for good; its driver still turns the device off if it desaturates.
     On,
     /// It is off for good.
     Off,
@@ -16,7 +16,7 @@ pub enum Stuck {
     Shorted,
 }
 
-/// The time for which a leg's output may be away from where it should be before its monitor tells, in ticks (10 µs).
+/// Time for which a leg's output may differ from its expected level before its monitor reports it, in ticks (10 µs).
 const MONITOR_TICKS: Tick = 250;
 
 /// The order to a leg.
@@ -27,7 +27,7 @@ enum Order {
     Lower,
 }
 
-/// One leg: its order, and what its two gates really do, the dead time included.
+/// One leg: its order, and the real state of its two gates, including the dead time.
 #[derive(Clone, Copy, Debug)]
 struct LegDriver {
     order: Order,
@@ -47,9 +47,9 @@ pub struct Inverter {
     /// Next toggle of each leg within the half.
     toggles: [Option<Tick>; 3],
     safe: Option<SafeState>,
-    /// A gate that no longer does what it is told.
+    /// A gate that no longer follows its commands.
     stuck: Option<(u8, Stuck)>,
-    /// Since when a leg's output is not where it should be.
+    /// The time since which a leg's output has not been at its expected level.
     astray_since: Option<Tick>,
     found: LegFaults,
     edges: Vec<Edge>,
@@ -75,19 +75,19 @@ impl Inverter {
         }
     }
 
-    /// The same playing from another tick on.
+    /// The same, playing from another tick on.
     pub fn beginning_at(mut self, origin: Tick) -> Self {
         self.half_start += origin;
         self
     }
 
-    /// The same without a list of edges.
+    /// The same, without a list of edges.
     pub fn without_edges(mut self) -> Self {
         self.keeps_edges = false;
         self
     }
 
-    /// The half that is played.
+    /// The half that is being played.
     pub fn half(&self) -> &CarrierHalf {
         &self.half
     }
@@ -97,7 +97,7 @@ impl Inverter {
         self.half_start + Tick::from(self.half.period_ticks)
     }
 
-    /// The safe state in which the gates are, whatever is played.
+    /// The safe state of the gates, whatever is played.
     pub fn safe(&self) -> Option<SafeState> {
         self.safe
     }
@@ -139,7 +139,7 @@ impl Inverter {
         }
     }
 
-    /// The safe state is left: all gates off, until the next half takes over.
+    /// The safe state is left: all gates stay off until the next half takes over.
     pub fn leave(&mut self, tick: Tick) {
         self.safe = None;
         for phase in 0..3 {
@@ -168,7 +168,7 @@ impl Inverter {
         }
     }
 
-    /// Something is wrong with a gate from now on.
+    /// A gate is faulty from now on.
     pub fn stick(&mut self, gate: u8, stuck: Stuck) {
         self.stuck = Some((gate, stuck));
         let leg = &self.legs[usize::from(gate / 2)];
@@ -177,13 +177,13 @@ impl Inverter {
         }
     }
 
-    /// Every gate does again what it is told, and what was found is forgotten.
+    /// Every gate follows its commands again, and the findings are cleared.
     pub fn mend(&mut self) {
         (self.stuck, self.astray_since, self.found) = (None, None, LegFaults::default());
     }
 
-    /// A device is turned on. Where the other one of its leg conducts, the drivers see their devices desaturate, turn them off within
-    /// some microseconds, and block. A device that has failed stays on.
+    /// A device is turned on. If the other one of its leg conducts, the drivers detect desaturation, turn their devices off within some microseconds,
+    /// and block. A device that has failed stays on.
     fn turns_on(&mut self, gate: u8) {
         match self.stuck {
             Some((other, Stuck::On)) if other == gate ^ 1 => self.found.blocked |= 0b11 << (gate & !1),
@@ -192,7 +192,7 @@ impl Inverter {
         }
     }
 
-    /// Looks at the legs' outputs over a time in which no gate changed; `currents_a` at its end.
+    /// Checks the legs' outputs over a time in which no gate changed; `currents_a` at its end.
     pub fn monitor(&mut self, currents_a: [f64; 3], from: Tick, to: Tick) {
         let Some((gate, _)) = self.stuck else { return };
         let leg = usize::from(gate / 2);
@@ -213,7 +213,7 @@ impl Inverter {
         self.found
     }
 
-    /// The legs as the machine sees them.
+    /// The legs as seen by the machine.
     pub fn legs(&self) -> [Leg; 3] {
         let mut legs = self.ordered_legs();
         if let Some((gate, stuck)) = self.stuck
@@ -245,7 +245,7 @@ impl Inverter {
         &self.edges
     }
 
-    /// Takes every edge since the last time.
+    /// Takes every edge since the last call.
     pub fn take_edges(&mut self) -> Vec<Edge> {
         std::mem::take(&mut self.edges)
     }

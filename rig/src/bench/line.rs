@@ -1,4 +1,4 @@
-//! The line side in the timers' time: contactors, a chopper that switches, and whoever commands the drive.
+//! The line side in the timers' time: contactors, a switching chopper, and the sender of the drive's commands.
 
 use super::switchgear::Held;
 use super::{Switchgear, Tick};
@@ -17,19 +17,19 @@ pub type Commander = Box<dyn Fn(f64) -> Request + Send>;
 pub struct LinePlan {
     /// The link.
     pub link: DcLinkSettings,
-    /// `true` if the link stands at the source's voltage, main contactor open, when the run begins.
+    /// `true` if the link is at the source's voltage, with the main contactor open, when the run begins.
     pub starts_charged: bool,
     /// The sender of commands.
     pub commander: Commander,
-    /// Causes in hardware that hold the gates off: from, until (s from the recording's beginning), which.
+    /// Causes in hardware that keep the gates off: start and end (s from the recording's beginning), and the cause.
     pub hardware: Vec<(f64, f64, Fault)>,
-    /// From these times on (s) the braking resistor has this resistance, in ohm.
+    /// Times (s) from which on the braking resistor has this resistance, in ohm.
     pub chopper_ohm: Vec<(f64, f64)>,
-    /// The times (s) from which on the source takes energy back, or does not.
+    /// Times (s) from which on the source takes energy back, or does not.
     pub reversible: Vec<(f64, bool)>,
-    /// The times (s) from which on the source is there, or is not: gaps in the line.
+    /// Times (s) from which on the source is present, or is not: gaps in the line.
     pub live: Vec<(f64, bool)>,
-    /// The warmth of machine and inverter, with its sensors; `None`: they stay as they are, and there are no sensors.
+    /// Temperatures of machine and inverter, with their sensors; `None`: they stay constant, and there are no sensors.
     pub heat: Option<Heat>,
 }
 
@@ -67,10 +67,10 @@ pub struct LineSide {
     gear: Switchgear<Request, f32>,
     discharge: bool,
     duty: f64,
-    /// The running chopper period's end, and where in it the chopper goes off.
+    /// The end of the running chopper period, and the time in it at which the chopper goes off.
     chopper_period: Tick,
     chopper_off: Option<Tick>,
-    /// The operator's last word that has taken effect.
+    /// The operator's last status that has taken effect.
     pub status: Option<Status>,
 }
 
@@ -95,7 +95,7 @@ impl LineSide {
         }
     }
 
-    /// Current in the choke, in A; `None` where there is none.
+    /// Current in the choke, in A; `None` if there is none.
     pub fn choke_a(&self) -> Option<f64> {
         (self.link.settings.source.inductance_h > 0.0).then_some(self.link.choke_a)
     }
@@ -112,13 +112,14 @@ impl LineSide {
         }
     }
 
-    /// The cause that holds the gates off in hardware at `t_s`.
+    /// The cause that keeps the gates off in hardware at `t_s`.
     pub fn hardware(&self, t_s: f64) -> Option<Fault> {
         let held = self.plan.hardware.iter().find(|(from, until, _)| (*from..*until).contains(&t_s));
         held.map(|(.., fault)| *fault)
     }
 
-    /// A control sample at `now`, `t_s`, with the rotor's angle known or not: the first of every millisecond begins a slot. Returns whether the operator has fallen behind.
+    /// A control sample at `now`, `t_s`, with the rotor's angle known or not: the first one of every millisecond begins a slot. Returns whether the operator
+    /// has fallen behind.
     pub fn sampled(&mut self, now: Tick, t_s: f64, position_known: bool) -> bool {
         let hardware = self.hardware(t_s);
         let temperatures = self.plan.heat.as_ref().map_or(Ratios::default(), |heat| heat.ratios(t_s));
@@ -127,7 +128,7 @@ impl LineSide {
         gear.sampled(now, held, || (plan.commander)(t_s))
     }
 
-    /// Warms machine and inverter by the losses of `dt_s`, where they do; the machine's resistance and magnets follow.
+    /// Warms machine and inverter by the losses of `dt_s`, if temperatures are modelled; the machine's resistance and magnets follow.
     pub fn warm(&mut self, plant: &mut Plant, dt_s: f64) {
         let udc_v = self.link.udc_v;
         if let Some(heat) = &mut self.plan.heat {
@@ -135,7 +136,7 @@ impl LineSide {
         }
     }
 
-    /// The warmth of machine and inverter.
+    /// Temperatures of machine and inverter.
     pub fn heat(&self) -> Option<&Heat> {
         self.plan.heat.as_ref()
     }
@@ -156,7 +157,7 @@ impl LineSide {
         [self.gear.next_event(), period, self.chopper_off].into_iter().flatten().min()
     }
 
-    /// Does what is due at `now`, `t_s`; returns the operator's word if it takes effect here.
+    /// Does what is due at `now`, `t_s`; returns the operator's status if it takes effect here.
     pub fn act(&mut self, now: Tick, t_s: f64) -> Option<SlotRow> {
         let row = self.gear.act(now).map(|status| SlotRow { t_s, status });
         if let Some(SlotRow { status, .. }) = row {
@@ -164,7 +165,7 @@ impl LineSide {
             let Switches { discharge, chopper, .. } = status.switches;
             self.discharge = discharge;
             self.duty = f64::from(chopper);
-            // The chopper's period is the slot.
+            // The chopper's period equals the slot.
             self.chopper_period = now;
         }
         if self.chopper_off.is_some_and(|at| at <= now) {

@@ -1,4 +1,4 @@
-//! The changes that somebody makes on a bench while it runs, and the rows that he takes from it.
+//! Changes made to a bench while it runs, and the rows taken from it.
 
 use super::{Bench, Limits, LineSide, Observed, Tick};
 use crate::inject::Injection;
@@ -13,7 +13,7 @@ impl Bench {
         self
     }
 
-    /// The rows and edges since the last time; changes of mode and the operator's words are forgotten.
+    /// The rows and edges since the last call; changes of mode and the operator's status are discarded.
     pub fn take(&mut self) -> (Vec<Row>, Vec<Edge>) {
         self.switches.clear();
         self.slots.clear();
@@ -35,7 +35,7 @@ impl Bench {
         &mut self.plant
     }
 
-    /// The line side, where there is one.
+    /// The line side, if there is one.
     pub fn line(&self) -> Option<&LineSide> {
         self.dc.operated()
     }
@@ -45,7 +45,7 @@ impl Bench {
         self.dc.operated_mut().map(|line| &mut line.link)
     }
 
-    /// Something goes wrong from the next instant on. A fault before this one is mended.
+    /// Injects a fault from the next instant on. The fault before this one is removed.
     pub fn inject(&mut self, kind: Kind) {
         self.mend();
         let from = self.time.now + 1;
@@ -53,7 +53,7 @@ impl Bench {
         self.observed = Observed::new(from, Limits::NONE);
     }
 
-    /// Mends what was injected; what the drive has latched stays latched.
+    /// Removes the injected fault; what the drive has latched stays latched.
     pub fn mend(&mut self) {
         self.spoiler = Spoiler::new(None);
         self.inverter.mend();

@@ -1,9 +1,9 @@
-//! The bench: machine and inverter in the timers' time, sampled and recorded. What stands at the other end of a board's
-//! ports, whether the drive runs on the host or in QEMU.
+//! The bench: machine and inverter in the timers' time, sampled and recorded. It is connected to the other end of a board's ports, whether the drive
+//! runs on the host or in QEMU.
 //!
-//! Time is counted in whole ticks of the firmware's clock, so both sides agree on every instant. The bench never runs
-//! ahead of what is decided: it advances only as far as it is asked to, and everything it is told takes effect at a
-//! fixed delay after its nominal instant, so that arrival order changes nothing.
+//! Time is counted in whole ticks of the firmware's clock, so both sides agree on every instant. The bench never runs ahead of decisions: it advances
+//! only as far as it is asked to, and everything it is told takes effect at a fixed delay after its nominal instant, so the order of arrival changes
+//! nothing.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod conversions;
@@ -58,8 +58,8 @@ use tractive::ports::Report;
 use tractive::protection::SafeState;
 use tractive::time::{Clock, Instant};
 
-/// The delay from an interrupt's nominal instant until its order to enter a safe state reaches the gates, in ticks (25 µs): longer
-/// than both interrupts together take, as a bound that does not depend on which of them came first.
+/// The delay from an interrupt's nominal instant until its order to enter a safe state reaches the gates, in ticks (25 µs): longer than both
+/// interrupts together take, as a bound that does not depend on which of them came first.
 const SAFE_STATE_DELAY: Tick = 625;
 
 /// Machine, inverter, sensors and recorder.
@@ -67,7 +67,7 @@ pub struct Bench {
     plant: Plant,
     inverter: Inverter,
     sensors: Sensors,
-    /// Holds of the conversions for control, and at the carrier's boundaries.
+    /// Holds of the conversions for control, and of those at the carrier's boundaries.
     holds: [Holds; 2],
     dc: DcSide,
     spoiler: Spoiler,
@@ -78,12 +78,12 @@ pub struct Bench {
     time: Timeline,
     end: Tick,
     next: Option<CarrierHalf>,
-    /// Orders to enter a safe state, or to leave it (`None`), and when they reach the gates.
+    /// Orders to enter a safe state, or to leave it (`None`), and the times at which they reach the gates.
     orders: Due<Option<SafeState>>,
     slots: Vec<SlotRow>,
     control: Conversions<Sampled, Report>,
     loads: Due<f64>,
-    /// The rows that are judged, and the others that are written.
+    /// The rows that are judged, and the others, which are written.
     rows: Rows<Row>,
     written: Option<Rows<Row>>,
     /// Extremes since the last row that is judged.
@@ -126,7 +126,7 @@ impl Bench {
         }
     }
 
-    /// The same beginning at another tick than 0, with tasks of [`crate::run::traction::Tasks::beginning_at`] the same: where instants wrap.
+    /// The same, beginning at another tick than 0 together with the tasks of [`crate::run::traction::Tasks::beginning_at`]: for runs in which instants wrap.
     pub fn beginning_at(mut self, origin: Tick) -> Self {
         self.time = self.time.beginning_at(origin);
         let written = self.written.as_mut().map(|rows| &mut rows.next);
@@ -139,20 +139,20 @@ impl Bench {
         self
     }
 
-    /// The same without a list of edges: for runs so long that it would fill the memory.
+    /// The same, without a list of edges: for runs so long that it would fill the memory.
     pub fn without_edges(mut self) -> Self {
         self.inverter = self.inverter.without_edges();
         self
     }
 
-    /// The same with a trace that is written at a step of its own, in s, beside the one that is judged.
+    /// The same, with a trace that is written at its own step, in s, in addition to the one that is judged.
     pub fn writing_every(mut self, step_s: f64) -> Self {
         let duration_s = self.time.seconds(self.end);
         self.written = Some(Rows::new(step_s, duration_s, &self.time));
         self
     }
 
-    /// The same with a line side, if there is one: the link's voltage is its capacitor's, and the drive has an operator.
+    /// The same, with a line side, if there is one: the link's voltage is its capacitor's, and the drive has an operator.
     pub fn with_line(mut self, plan: Option<LinePlan>) -> Self {
         if let Some(plan) = plan {
             self.dc = DcSide::Operated(Box::new(LineSide::new(plan, &self.clock)));
@@ -160,7 +160,7 @@ impl Bench {
         self
     }
 
-    /// The same with an incremental encoder in the place of the absolute one.
+    /// The same, with an incremental encoder instead of the absolute one.
     pub fn with_encoder(mut self, encoder: Option<Encoder>) -> Self {
         self.sensors = self.sensors.with_encoder(encoder);
         self
@@ -186,7 +186,7 @@ impl Bench {
         Ok(())
     }
 
-    /// The warmth of machine and inverter, where the line side's plan has it.
+    /// Temperatures of machine and inverter, if the line side's plan includes them.
     pub fn heat(&self) -> Option<&Heat> {
         self.dc.operated().and_then(LineSide::heat)
     }
@@ -219,7 +219,7 @@ impl Bench {
         self.orders.push(self.time.widen(instant) + SAFE_STATE_DELAY, order);
     }
 
-    /// The safe state in which the gates will be once every order has reached them.
+    /// The safe state of the gates once every order has reached them.
     fn will_be_safe(&self) -> Option<SafeState> {
         self.orders.last().copied().unwrap_or(self.inverter.safe())
     }

@@ -18,7 +18,7 @@ pub struct Peaks {
 }
 
 impl Peaks {
-    /// Of an instant.
+    /// The extremes of an instant.
     pub fn at(currents_a: &[f64], id_a: f64, udc_v: f64, uc_v: f64) -> Self {
         let current_a = currents_a.iter().fold(0.0, |most, current| larger(most, current.abs()));
         Self { current_a, lowest_id_a: id_a.min(0.0), udc_v, uc_v }
@@ -32,12 +32,12 @@ impl Peaks {
     }
 }
 
-/// The larger one; what is no number stays, so that somebody sees it.
+/// The larger one; a value that is not a number stays, so that it is noticed.
 fn larger(most: f64, now: f64) -> f64 {
     if most.is_nan() || now <= most { most } else { now }
 }
 
-/// The limits that a sound plant keeps to: beyond them a fault makes a difference.
+/// The limits within which a healthy plant stays: beyond them a fault makes a difference.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Largest phase current, in A.
@@ -50,12 +50,12 @@ pub struct Limits {
     pub source_v: f64,
     /// Highest speed, in r/min.
     pub speed_rpm: f64,
-    /// Time between two samples, in ticks: what is beyond for less nobody has to see.
+    /// Time between two samples, in ticks: an excess that is shorter need not be seen by anybody.
     pub sampling_ticks: Tick,
 }
 
 impl Limits {
-    /// Everything is sound.
+    /// Limits that nothing exceeds.
     pub const NONE: Self = Self {
         current_a: f64::INFINITY,
         udc_v: (f64::NEG_INFINITY, f64::INFINITY),
@@ -74,21 +74,21 @@ impl Limits {
     }
 }
 
-/// The energy that is stored when the gates become safe, and must go somewhere.
+/// The stored energy when the gates become safe, which must go somewhere.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stored {
-    /// The highest voltage from then on if the bridge were gone, in V: of the link, or of the ZS9's capacitors.
+    /// The highest voltage from then on if the bridge were absent, in V: of the link, or of the ZS9's capacitors.
     pub unloaded_v: f64,
     /// Energy of the machines' fields, in J.
     pub field_j: f64,
     /// Energy that the rotors still give while the flux decays against the link, in J.
     pub braked_j: f64,
-    /// Largest current of a machine that is short-circuited with the flux linkage that it has, in A.
+    /// Largest current of a machine that is short-circuited with its present flux linkage, in A.
     pub short_circuit_a: f64,
 }
 
 impl Stored {
-    /// Of motors against which this voltage (V) stands when the gates are blocked.
+    /// The stored energy of motors opposed by this voltage (V) when the gates are blocked.
     pub fn of(motors: &[Motor], against_v: f64, unloaded_v: f64) -> Self {
         Self {
             unloaded_v,
@@ -104,25 +104,26 @@ impl Stored {
 pub struct Observed {
     /// The fault's instant.
     pub from: Tick,
-    /// The time at which the fault first made a difference that is more than small, if that is known.
+    /// The time at which the fault first made more than a small difference, if known.
     pub effect: Option<Tick>,
     /// Length of a carrier at the fault's instant, in ticks.
     pub carrier_ticks: Tick,
     /// The time at which the gates were safe, and their safe state.
     pub safe: Option<(Tick, SafeState)>,
-    /// The energy that was stored then.
+    /// The stored energy at that time.
     pub stored: Stored,
-    /// Extremes until then.
+    /// Extremes up to that time.
     pub until: Peaks,
-    /// And after that.
+    /// Extremes after that time.
     pub after: Peaks,
     limits: Limits,
-    /// The times from which and until which something was beyond its limits last; back within its limits for less than between two samples it counts as beyond.
+    /// The times from which and until which something was last beyond its limits; a return within the limits for less than the time between two samples still
+    /// counts as beyond.
     beyond: Option<(Tick, Tick)>,
 }
 
 impl Observed {
-    /// Nothing yet.
+    /// Nothing observed yet.
     pub fn new(from: Tick, limits: Limits) -> Self {
         Self {
             from,
@@ -137,7 +138,7 @@ impl Observed {
         }
     }
 
-    /// The plant at an instant.
+    /// Takes the plant's values at an instant.
     pub fn note(&mut self, now: Tick, peaks: &Peaks, speed_rpm: f64) {
         if now < self.from {
             return;
@@ -158,14 +159,14 @@ impl Observed {
         (now.saturating_sub(until) <= self.limits.sampling_ticks).then_some(since)
     }
 
-    /// The fault makes a difference now.
+    /// Records that the fault makes a difference now.
     pub fn makes_a_difference(&mut self, now: Tick) {
         if now >= self.from {
             self.effect.get_or_insert(now);
         }
     }
 
-    /// The gates are safe from now on.
+    /// Records that the gates are safe from now on.
     pub fn enters(&mut self, now: Tick, safe: SafeState, stored: Stored) {
         if self.safe.is_none() {
             self.effect = self.effect.or(self.beyond_lately(now));
@@ -174,7 +175,7 @@ impl Observed {
         }
     }
 
-    /// From the fault's first effect, or from the fault where none is known, until the gates were safe, in ticks.
+    /// Time from the fault's first effect, or from the fault if no effect is known, until the gates were safe, in ticks.
     pub fn ticks_to_safe(&self) -> Option<Tick> {
         let (safe, _) = self.safe?;
         let effect = self.effect.filter(|effect| *effect <= safe).unwrap_or(self.from);
@@ -186,7 +187,7 @@ impl Observed {
 mod tests {
     use super::*;
 
-    /// A peak that is shorter than a sampling period nobody has to see; one that a trip follows somebody has.
+    /// A peak shorter than a sampling period need not be seen; a peak followed by a trip has been seen.
     #[test]
     fn a_limit_counts_from_where_a_sample_sees_it() {
         let limits =

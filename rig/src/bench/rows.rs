@@ -3,7 +3,7 @@
 use super::Timeline;
 use crate::trace::Tick;
 
-/// Rows for which room is made at once.
+/// Largest number of rows for which memory is reserved in advance.
 const MOST_ROWS: usize = 1 << 20;
 
 /// Rows at one step.
@@ -17,7 +17,7 @@ pub struct Rows<R> {
 }
 
 impl<R> Rows<R> {
-    /// None yet, from the recording's beginning on; for so long there is room, in s.
+    /// None yet, from the recording's beginning on; memory is reserved for this duration, in s.
     pub fn new(step_s: f64, duration_s: f64, time: &Timeline) -> Self {
         let room = MOST_ROWS.min((duration_s / step_s) as usize + 2);
         Self { step_s, next: time.lead, due: 0, rows: Vec::with_capacity(room) }
@@ -33,29 +33,29 @@ impl<R> Rows<R> {
         self.due.saturating_sub(1) as f64 * self.step_s
     }
 
-    /// The number of those that end by a time, in s.
+    /// Number of those that end by a time, in s.
     pub fn until(&self, end_s: f64) -> u64 {
         (end_s / self.step_s).round() as u64
     }
 
-    /// `true` if more than so many have been due, the first at the recording's beginning.
+    /// `true` if more than `count` have been due, the first at the recording's beginning.
     pub fn has(&self, count: u64) -> bool {
         self.due > count
     }
 
-    /// The next one; nothing where the recording is over.
+    /// Adds the next one; does nothing if the recording is over.
     pub fn push(&mut self, row: Option<R>, time: &Timeline) {
         self.rows.extend(row);
         self.due += 1;
         self.next = time.row_end(self.next_s());
     }
 
-    /// Takes those there are.
+    /// Takes the existing ones.
     pub fn take(&mut self) -> Vec<R> {
         std::mem::take(&mut self.rows)
     }
 
-    /// Those there are.
+    /// The existing ones.
     pub fn as_slice(&self) -> &[R] {
         &self.rows
     }

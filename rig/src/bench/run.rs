@@ -6,7 +6,7 @@ use crate::inject::traction::Kind;
 use tractive::protection::LegFaults;
 
 impl Bench {
-    /// Runs to `tick`, doing on the way all that is due, and at `tick` itself too.
+    /// Runs to `tick`, doing everything that is due on the way, including at `tick` itself.
     pub(super) fn advance(&mut self, tick: Tick) -> Result<(), BenchError> {
         while self.time.now < tick {
             let due = self.due(tick);
@@ -17,7 +17,7 @@ impl Bench {
         Ok(())
     }
 
-    /// The next tick after now at which something is due, at the latest `tick`.
+    /// The next tick after now at which something is due, but not later than `tick`.
     pub(crate) fn due(&self, tick: Tick) -> Tick {
         let now = self.time.now;
         let fault = Some(self.observed.from).filter(|from| *from > now);
@@ -51,20 +51,20 @@ impl Bench {
         self.plant.motor.energies.electrical_j - before_j
     }
 
-    /// Voltage of a line behind a shared link, in V; `None` where it is cut off.
+    /// Voltage of a line behind a shared link, in V; `None` if it is disconnected.
     pub(crate) fn line_now(&self) -> Option<f64> {
         let t_s = self.time.now_s();
         line_v((self.sensors.supply_v(t_s), self.spoiler.supply(t_s)))
     }
 
-    /// Comes to `tick` with a shared link, after [`Self::turn_on`], and does what is due.
+    /// Arrives at `tick` with a shared link, after [`Self::turn_on`], and does what is due.
     pub(crate) fn arrive(&mut self, tick: Tick, terminal: Terminal) -> Result<(), BenchError> {
         self.dc = DcSide::Shared(terminal);
         self.pass(tick);
         self.act()
     }
 
-    /// The plant as it is seen at `tick`, to which it has run.
+    /// Records the plant as seen at `tick`, to which it has run.
     fn pass(&mut self, tick: Tick) {
         let now = self.time.now;
         if tick > now {
@@ -91,7 +91,7 @@ impl Bench {
         self.dc.udc_v(|| self.sensors.supply_v(t_s))
     }
 
-    /// The energy that is stored, and the part of it that the link must take.
+    /// The stored energy, and the part of it that the link must take.
     fn stored(&self) -> Stored {
         let now_s = self.time.now_s();
         let unloaded_v = self.dc.unloaded_v(|ahead_s| {
@@ -99,7 +99,7 @@ impl Bench {
             (self.sensors.supply_v(t_s), self.spoiler.supply(t_s))
         });
         let udc_v = self.udc_v(now_s);
-        // Two thirds of the link take the flux linkage away.
+        // Two thirds of the link voltage remove the flux linkage.
         Stored::of(std::slice::from_ref(&self.plant.motor), 2.0 / 3.0 * udc_v, unloaded_v.max(udc_v))
     }
 
@@ -130,7 +130,7 @@ impl Bench {
         while let Some(order) = self.orders.take(now) {
             match order {
                 Some(safe) => {
-                    // A sensor whose error is found while it still makes no difference that counts.
+                    // Case of a sensor whose error is detected while it still makes no difference that counts.
                     if let Some(Kind::Current(..)) = self.spoiler.injected.kind(self.time.now_s()) {
                         self.observed.makes_a_difference(now);
                     }

@@ -9,36 +9,36 @@ use tractive::ports::{DriveCommand, Report, Sample};
 use tractive::protection::LegFaults;
 use tractive::time::Instant;
 
-/// The error of a current's reading that makes no difference which counts, in A: a tenth of the machine's largest current,
-/// which is what the sum of the phases may be. On top comes so many times the sum's own noise, and the converters' steps, in which it does not show.
+/// Largest error of a current reading that does not count as a difference, in A: a tenth of the machine's largest current, which is the tolerance of
+/// the phases' sum. Added to it are a multiple of the sum's own noise, and the converters' steps, in which the error does not show.
 const MUCH_A: f32 = 23.3;
 const HIDDEN_NOISES: f64 = 3.0;
 
-/// A control sample with what comes beside it.
+/// A control sample with its additional data.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampled {
     /// The sample.
     pub sample: Sample,
     /// The bench's command.
     pub command: DriveCommand,
-    /// The turn that a position sensor has counted, electrical, where it has no angle.
+    /// The electrical turn that a position sensor has counted while it has no angle.
     pub counted: Option<Angle>,
 }
 
 impl Bench {
-    /// The conversions that the control timer triggered at `instant`, and what the bench commands.
+    /// The conversions that the control timer triggered at `instant`, and the bench's command.
     pub fn control_sample(&mut self, instant: Instant) -> Result<Sampled, BenchError> {
         let tick = self.time.widen(instant);
         self.advance(tick)?;
         self.control.ask(tick)
     }
 
-    /// The control interrupt's report; it shows in the trace when the command takes effect.
+    /// The control interrupt's report; it appears in the trace when the command takes effect.
     pub fn control_report(&mut self, instant: Instant, report: Report) {
         self.control.tell(&self.time, instant, report);
     }
 
-    /// The observation that an identification's control interrupt, begun at `instant`, tells; with the last word the recording ends a period later.
+    /// The observation reported by an identification's control interrupt that began at `instant`; after the last one the recording ends a period later.
     pub fn identified(&mut self, instant: Instant, observation: Observation) {
         if observation.stage == Stage::Done {
             self.end_at(instant.after(self.clock.control_ticks));
@@ -46,13 +46,13 @@ impl Bench {
         self.observations.push(observation);
     }
 
-    /// Tells the position sensor the electrical angle where it began to count.
+    /// Tells the position sensor the electrical angle at which it began to count.
     pub fn align(&mut self, zero: Angle) {
         let t_s = self.time.now_s();
         self.found = self.sensors.align(zero).map(|error_deg| Found { t_s, error_deg });
     }
 
-    /// By how much the control interrupt is late, in ticks.
+    /// Delay of the control interrupt, in ticks.
     pub fn control_late_ticks(&self) -> u32 {
         self.spoiler.injected.late_ticks(self.time.now_s())
     }
@@ -79,7 +79,7 @@ impl Bench {
         let read_a = self.spoiler.currents(self.time.now_s(), true_a);
         let off = [read_a.a - true_a.a, read_a.b - true_a.b, read_a.c - true_a.c];
         let much_a = MUCH_A + self.sensors.hidden_a(HIDDEN_NOISES);
-        // What is not a number is off as well.
+        // A value that is not a number counts as off, too.
         if off.iter().any(|off| off.is_nan() || off.abs() > much_a) {
             self.observed.makes_a_difference(self.time.now);
         }
@@ -99,10 +99,10 @@ impl Bench {
         let held_a = for_control.read(self.sensors.behind(&self.plant.motor));
         let (true_a, position) = self.sensors.measure(held_a, &self.plant.motor, t_s);
         let hardware = self.dc.operated().and_then(|line| line.hardware(t_s));
-        // Without control nobody looks after the operator.
+        // Without control nobody responds to the operator.
         let known = position.angle.is_some();
         if known && self.found.is_none() && self.sensors.has_encoder() {
-            // The index was first.
+            // The index came first.
             self.found = Some(Found { t_s, error_deg: 0.0 });
         }
         if self.dc.operated_mut().is_some_and(|line| line.sampled(now, t_s, known)) && has_control {

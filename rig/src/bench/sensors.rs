@@ -1,4 +1,4 @@
-//! The firmware's converters, as they see the machine.
+//! The firmware's converters and their view of the machine.
 
 use super::{Encoder, Position, Wiring};
 use crate::plant::Motor;
@@ -18,13 +18,13 @@ pub struct Flaws {
     pub noise_a: f64,
     /// Amplitude (V) and frequency (Hz) of the DC link's ripple.
     pub udc_ripple: Option<(f64, f64)>,
-    /// By how much a current is read larger than it is, as a share.
+    /// Relative error by which a current is read too large, as a share.
     pub current_gain: f64,
     /// The same of each phase by itself.
     pub current_gains: [f64; 3],
-    /// The currents that are read where none flows, in A.
+    /// The readings at zero current, in A.
     pub current_offsets_a: [f64; 3],
-    /// By how much the DC link is read larger than it is, as a share.
+    /// Relative error by which the DC link is read too large, as a share.
     pub udc_gain: f64,
     /// The wires of the current sensors.
     pub current_wiring: Wiring,
@@ -32,28 +32,28 @@ pub struct Flaws {
     pub angle_reversed: bool,
     /// Constant error of the angle sensor, electrical, in degrees.
     pub angle_error_deg: f64,
-    /// Time after its sample in which the angle is read, in s; each time at another instant.
+    /// Time after its sample at which the angle is read, in s; different each time.
     pub angle_jitter_s: f64,
-    /// Errors of the angle that go once and twice with it, electrical: amplitudes in degrees.
+    /// Errors of the angle of first and second order over it, electrical: amplitudes in degrees.
     pub angle_harmonics_deg: [f64; 2],
-    /// Their phases where the angle is 0, in degrees.
+    /// Their phases at angle 0, in degrees.
     pub angle_phases_deg: [f64; 2],
     /// Age of the angle when it is read, in s.
     pub angle_late_s: f64,
-    /// Counts of the angle in an electrical turn, of which the middle is told; `None`: as fine as the word.
+    /// Counts of the angle in an electrical turn, with the middle of a count reported; `None`: as fine as the word.
     pub angle_counts: Option<f64>,
     /// Time constant of the current sensors, in s.
     pub current_filter_s: f64,
-    /// Time by which each phase's current is sampled before the rest, in s.
+    /// Time by which each phase's current is sampled before the nominal instant, in s.
     pub adc_skew_s: [f64; 3],
-    /// From this time on control is told the same currents again and again, in s.
+    /// Time from which on control gets the same currents again and again, in s.
     pub freeze_at_s: Option<f64>,
     /// Seed of the noise.
     pub seed: u64,
 }
 
 impl Flaws {
-    /// None.
+    /// No flaws.
     pub const NONE: Self = Self {
         adc_bits: None,
         adc_full_scale_a: 0.0,
@@ -82,7 +82,7 @@ impl Flaws {
 pub struct Converter {
     flaws: Flaws,
     random: StdRng,
-    /// Phase currents behind the sensors' time constant, in A.
+    /// Phase currents after the sensors' time constant, in A.
     filtered_a: [f64; 3],
     /// Phase currents at the end of the last step, in A.
     before_a: [f64; 3],
@@ -94,7 +94,7 @@ impl Converter {
         Self { flaws, random: StdRng::seed_from_u64(flaws.seed), filtered_a: [0.0; 3], before_a: [0.0; 3] }
     }
 
-    /// Lets time pass at whose end the motor has these phase currents, in A: between two edges they run straight, and a step may be longer than the
+    /// Lets time pass until the motor has these phase currents, in A: between two edges they are straight lines, and a step may be longer than the
     /// sensors' time constant.
     pub fn pass(&mut self, currents_a: [f64; 3], dt_s: f64) {
         if self.flaws.current_filter_s > 0.0 && dt_s > 0.0 {
@@ -102,7 +102,7 @@ impl Converter {
             let kept = libm::exp(-steps);
             let phases = self.filtered_a.iter_mut().zip(self.before_a).zip(currents_a);
             for ((filtered_a, before_a), current_a) in phases {
-                // Behind a ramp by what it rises in a time constant.
+                // A ramp's output lags by its rise in a time constant.
                 let behind_a = (current_a - before_a) / steps;
                 *filtered_a = current_a - behind_a + (*filtered_a - before_a + behind_a) * kept;
             }
@@ -153,19 +153,19 @@ impl Converter {
         self.converted(self.behind(motor))
     }
 
-    /// A motor's phase currents behind the sensors' time constant, in A.
+    /// A motor's phase currents after the sensors' time constant, in A.
     pub fn behind(&self, motor: &Motor) -> [f64; 3] {
         if self.flaws.current_filter_s > 0.0 { self.filtered_a } else { motor.currents_abc() }
     }
 
-    /// Phase currents that were held, as converted, in A.
+    /// Held phase currents, as converted, in A.
     pub fn converted(&mut self, behind_a: [f64; 3]) -> Abc {
         let read_a = self.flaws.current_wiring.read(behind_a);
         let [a, b, c] = [0, 1, 2].map(|sensor| self.convert(sensor, read_a[sensor]) as f32);
         Abc { a, b, c }
     }
 
-    /// A motor's rotor angle as its sensor has it.
+    /// A motor's rotor angle as read by its sensor.
     pub fn angle(&mut self, motor: &Motor) -> Angle {
         let flaws = self.flaws;
         let true_turns = motor.angle_turns() - motor.turns_s() * flaws.angle_late_s;
@@ -186,13 +186,13 @@ impl Converter {
     }
 }
 
-/// Sensors, and what the supply's voltage is where nothing is wrong with it.
+/// Sensors, and the voltage of the supply without a fault.
 pub struct Sensors {
     udc_v: f64,
     link_steps: Vec<(f64, f64)>,
     converter: Converter,
     encoder: Option<Encoder>,
-    /// The currents that control was told last.
+    /// The currents that control was given last.
     told_a: Abc,
 }
 
@@ -202,13 +202,13 @@ impl Sensors {
         Self { udc_v, link_steps, converter: Converter::new(flaws), encoder: None, told_a: Abc::default() }
     }
 
-    /// The part of the sum of three phase currents that does not show in what is read, in A: so many times its noise, and half a step of each converter.
+    /// The part of the sum of three phase currents that does not show in the readings, in A: a multiple of its noise, and half a step of each converter.
     pub fn hidden_a(&self, noises: f64) -> f32 {
         let Flaws { noise_a, .. } = self.converter.flaws;
         (noises * 3.0_f64.sqrt() * noise_a + 1.5 * self.converter.step_a()) as f32
     }
 
-    /// The same with an incremental encoder, if there is one.
+    /// The same, with an incremental encoder, if there is one.
     pub fn with_encoder(mut self, encoder: Option<Encoder>) -> Self {
         self.encoder = encoder;
         self
@@ -219,12 +219,12 @@ impl Sensors {
         self.encoder.is_some()
     }
 
-    /// Tells the encoder, if there is one, the angle where it was switched on; returns by how much that is ahead, in degrees.
+    /// Tells the encoder, if there is one, its angle at power-up; returns by how many degrees that is ahead.
     pub fn align(&mut self, zero: Angle) -> Option<f64> {
         self.encoder.as_mut().map(|encoder| encoder.align(zero))
     }
 
-    /// The voltage of a healthy supply, which a stiff link has, in V.
+    /// The voltage of a healthy supply, which is also a stiff link's, in V.
     pub fn supply_v(&self, t_s: f64) -> f64 {
         let passed = self.link_steps.iter().rev().find(|(at_s, _)| t_s >= *at_s);
         passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + self.converter.ripple_v(t_s)
@@ -245,12 +245,12 @@ impl Sensors {
         self.converter.behind(motor)
     }
 
-    /// Phase currents that were held, as converted.
+    /// Held phase currents, as converted.
     pub fn converted(&mut self, held_a: [f64; 3]) -> Abc {
         self.converter.converted(held_a)
     }
 
-    /// The phase currents that control is told at `t_s`, of those that were held, and the rotor's angle.
+    /// The phase currents that control gets at `t_s`, from the held ones, and the rotor's angle.
     pub fn measure(&mut self, held_a: [f64; 3], motor: &Motor, t_s: f64) -> (Abc, Position) {
         if self.converter.flaws.freeze_at_s.is_none_or(|freeze_s| t_s < freeze_s) {
             self.told_a = self.converted(held_a);
@@ -265,7 +265,7 @@ impl Sensors {
 mod tests {
     use super::*;
 
-    /// A current that turns, behind a filter of 100 µs, by steps of so many s: the largest error beside the filter's own answer, in parts of it.
+    /// A rotating current, behind a filter of 100 µs, in steps of this many s: the largest deviation from the filter's own answer, as a share of it.
     fn off(step_s: f64) -> f64 {
         let (omega, filter_s) = (2_000.0, 1e-4);
         let mut converter = Converter::new(Flaws { current_filter_s: filter_s, ..Flaws::NONE });

@@ -26,7 +26,7 @@ pub struct Settings {
     pub first_half_ticks: u32,
     /// Dead time, in ticks.
     pub dead_time_ticks: u32,
-    /// Before the recording: time in which the drive settles, in s.
+    /// Settling time of the drive before the recording, in s.
     pub lead_s: f64,
     /// Length of the recording, in s.
     pub duration_s: f64,
@@ -42,6 +42,6 @@ pub struct Settings {
     pub supply: Supply,
     /// The fault that is injected.
     pub injection: Option<Injection<Kind>>,
-    /// Beyond what it is said to make a difference.
+    /// Limits beyond which it counts as making a difference.
     pub limits: Limits,
 }

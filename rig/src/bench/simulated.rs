@@ -1,4 +1,4 @@
-//! A bench, as whoever runs a drive on it sees it.
+//! A bench, from the point of view of the code that runs a drive on it.
 
 use super::Timeline;
 use tractive::time::Instant;
@@ -30,10 +30,10 @@ pub trait Simulated {
     fn time_s(&self) -> f64 {
         self.time().now_s()
     }
-    /// The rotors' loads from `instant` on, in N·m; of one rotor the first.
+    /// The rotors' loads from `instant` on, in N·m; for one rotor the first.
     fn loads_from(&mut self, instant: Instant, loads_nm: [f64; 2]);
     /// Ends the recording at `instant`.
     fn end_at(&mut self, instant: Instant);
-    /// The recording: what the bench saw, and what the drive's own recorder holds; instants in seconds from its beginning.
+    /// The recording: the bench's observations, and the content of the drive's own recorder; instants in seconds from its beginning.
     fn into_recording(self, records: Vec<Self::Record>) -> Self::Recording;
 }

@@ -1,4 +1,4 @@
-//! Contactors that take their time, and the operator's slots: what is asked of it, and what it has told.
+//! Contactors with their delays, and the operator's slots: the requests to it, and its answers.
 
 use super::Tick;
 use std::collections::VecDeque;
@@ -12,7 +12,7 @@ use tractive::time::Clock;
 const CLOSES_S: f64 = 0.04;
 const OPENS_S: f64 = 0.02;
 
-/// A contactor: told, and where it is.
+/// A contactor: its command and its position.
 #[derive(Clone, Copy, Debug, Default)]
 struct Contactor {
     told: bool,
@@ -46,12 +46,12 @@ pub struct Held {
     pub temperatures: Ratios,
 }
 
-/// Contactors and slots; `A` is what is asked besides the board's word, `T` what is told of the demands.
+/// Contactors and slots; `A` is what is asked in addition to the board's feedback, `T` what is reported about the demands.
 pub struct Switchgear<A, T> {
     tick_s: f64,
     main: Contactor,
     precharge: Contactor,
-    /// The operator's status, and the time from when on it holds.
+    /// The operator's status, and the time from which on it holds.
     told: VecDeque<(Tick, Status<T>)>,
     /// The request that the operator will see, by the slot's beginning.
     asked: VecDeque<(Tick, A, Feedback)>,
@@ -84,8 +84,8 @@ impl<A, T: Copy> Switchgear<A, T> {
         self.main.closed
     }
 
-    /// A control sample at `now`, with what the board sees beside contactors: the first of every millisecond begins a slot, in which this is
-    /// asked. Returns whether the operator has fallen behind.
+    /// A control sample at `now`, with what the board sees apart from contactors: the first one of every millisecond begins a slot, with this
+    /// request. Returns whether the operator has fallen behind.
     pub fn sampled(
         &mut self,
         now: Tick,
@@ -135,7 +135,7 @@ impl<A, T: Copy> Switchgear<A, T> {
         [told, self.main.moves, self.precharge.moves].into_iter().flatten().min()
     }
 
-    /// Does what is due at `now`; returns the operator's word if it takes effect here.
+    /// Does what is due at `now`; returns the operator's status if it takes effect here.
     pub fn act(&mut self, now: Tick) -> Option<Status<T>> {
         let mut newest = None;
         while let Some((at, status)) = self.told.front().copied()

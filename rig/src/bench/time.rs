@@ -1,4 +1,4 @@
-//! A bench's time: steps of the firmware's timers, or of what divides them finer.
+//! A bench's time, in steps of the firmware's timers or in finer ones.
 
 use super::BenchError;
 use crate::trace::Tick;
@@ -20,7 +20,7 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// At the first instant, with so many steps in a tick of the clock.
+    /// At the first instant, with this many steps in a tick of the clock.
     pub fn new(clock: Clock, per_tick: u32, lead_s: f64) -> Self {
         let step_s = f64::from(clock.ticks_per_s).recip() / f64::from(per_tick);
         let mut new = Self { clock, per_tick: per_tick.into(), step_s, origin: 0, now: 0, lead: 0 };
@@ -28,17 +28,17 @@ impl Timeline {
         new
     }
 
-    /// The same beginning at another step than 0.
+    /// The same, beginning at another step than 0.
     pub fn beginning_at(self, origin: Tick) -> Self {
         Self { origin: self.origin + origin, now: self.now + origin, lead: self.lead + origin, ..self }
     }
 
-    /// Steps in so much time, in s.
+    /// Number of steps in this time, in s.
     pub fn steps(&self, seconds: f64) -> Tick {
         (seconds / self.step_s).round() as Tick
     }
 
-    /// Steps of so many ticks of the clock.
+    /// Number of steps in this many ticks of the clock.
     pub fn of_ticks(&self, ticks: impl Into<Tick>) -> Tick {
         ticks.into() * self.per_tick
     }
@@ -48,7 +48,7 @@ impl Timeline {
         self.now / self.per_tick
     }
 
-    /// Now as the firmware has it.
+    /// Now, as an instant of the firmware.
     pub fn instant(&self) -> Instant {
         Instant(self.tick() as u32)
     }
@@ -69,7 +69,7 @@ impl Timeline {
         self.tick().saturating_add_signed(ahead) * self.per_tick
     }
 
-    /// The tick of an instant near to now from which on something is to hold.
+    /// The tick of an instant near to now, from which on something is to hold.
     pub fn coming(&self, from: Instant) -> Result<Tick, BenchError> {
         let step = self.widen(from);
         if step < self.now {
@@ -83,7 +83,7 @@ impl Timeline {
         (at as f64 - self.lead as f64) * self.step_s
     }
 
-    /// The same of now.
+    /// The same for now.
     pub fn now_s(&self) -> f64 {
         self.seconds(self.now)
     }

@@ -4,22 +4,22 @@ use serde::{Serialize, Serializer};
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
-/// The phase that each current sensor reads, and its sign: `u,v,w` where all is right, `-u,v,w` where the first has its leads exchanged,
-/// `v,u,w` where the first two are.
+/// The phase that each current sensor reads, and its sign: `u,v,w` if all is right, `-u,v,w` if the first has its leads swapped, `v,u,w` if the first
+/// two are swapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wiring([(u8, bool); 3]);
 
 impl Wiring {
-    /// As it should be.
+    /// Correct wiring.
     pub const RIGHT: Self = Self([(0, false), (1, false), (2, false)]);
 
-    /// Those in which all sensors have one sign, the right one first. Of others the phases' sum tells.
+    /// The wirings in which all sensors have the same sign, the right one first. Others are detected by the phases' sum.
     pub fn of_one_sign() -> [Self; 12] {
         const ORDERS: [[u8; 3]; 6] = [[0, 1, 2], [0, 2, 1], [2, 1, 0], [1, 0, 2], [1, 2, 0], [2, 0, 1]];
         std::array::from_fn(|k| Self(ORDERS[k / 2].map(|phase| (phase, k % 2 == 1))))
     }
 
-    /// The stationary frame's currents that are read of one A along α and along β, by rows.
+    /// The stationary-frame currents read for 1 A along α and along β, by rows.
     pub fn matrix(self) -> [[f64; 2]; 2] {
         let half_root = 0.75_f64.sqrt();
         let [of_alpha, of_beta] = [[1.0, -0.5, -0.5], [0.0, half_root, -half_root]].map(|phases| {

@@ -1,4 +1,4 @@
-//! The axes of a map, and how far they must go.
+//! The axes of a map, and their required range.
 
 use super::samples::Sample;
 use super::write::digits;
@@ -7,19 +7,19 @@ use std::path::Path;
 use tractive::start_up::SALIENT;
 use tractive_tablegen::{FluxMap, SmoothMap};
 
-/// Share of the largest current by which a map may end before it: rounding.
+/// Share of the largest current by which a map may end too early: rounding.
 pub const SHORT: f64 = 1e-4;
-/// The same of nodes on no grid: a coarse circle cuts its bows.
+/// The same for nodes that are not on a grid: a coarse circle cuts its arcs.
 pub const GAP: f64 = 0.02;
-/// Times that a map may go beyond the largest current: with more there is hardly a node below it.
+/// Factor by which a map may exceed the largest current: beyond that hardly a node lies below it.
 const FAR: f64 = 50.0;
-/// Magnets' flux linkage against d that is measurement, as a share of the largest.
+/// Magnets' flux linkage against d that counts as measurement error, as a share of the largest.
 const AGAINST: f64 = 0.01;
 
-/// The check that rows go as far as the largest current, in A, along −d and along q, and reach no current along d, but for a share of it.
+/// Checks that rows reach the largest current, in A, along −d and along q, and zero current along d, except for a share of it.
 ///
 /// # Errors
-/// The axis that ends too early or is too long, and the unit that is likely another.
+/// The axis that ends too early or is too long, and the unit that is probably wrong.
 pub fn check_ends(rows: &[Sample], most_a: f64, short: f64, path: &Path) -> Result<()> {
     let file = path.display();
     let (mut first, mut last, mut last_q) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
@@ -50,11 +50,11 @@ pub fn check_ends(rows: &[Sample], most_a: f64, short: f64, path: &Path) -> Resu
     Ok(())
 }
 
-/// The check that d is where start-up looks for it: along the magnets, or the least inductance. Saturation may leave L_q a little below L_d, as long as
-/// the pulses of start-up do not take one for the other.
+/// Checks that d is where start-up looks for it: along the magnets, or the least inductance. Saturation may make L_q slightly smaller than L_d, as long
+/// as the pulses of start-up do not confuse them.
 ///
 /// # Errors
-/// Magnets against d, or inductances that are exchanged.
+/// Magnets against d, or inductances that are swapped.
 pub fn check(map: &FluxMap, path: &Path) -> Result<()> {
     let file = path.display();
     let at = SmoothMap::new(map).at(0.0, 0.0);

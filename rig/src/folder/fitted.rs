@@ -1,4 +1,4 @@
-//! A flux map from nodes anywhere: the gradient of one co-energy, fitted by least squares.
+//! A flux map from nodes at any currents: the gradient of one co-energy, fitted by least squares.
 
 use super::axes::GAP;
 use super::ratings::rounded_down;
@@ -9,30 +9,30 @@ use crate::coenergy::{Basis, Equations, Polynomial};
 use anyhow::{Result, anyhow, bail, ensure};
 use tractive_tablegen::FluxMap;
 
-/// Least number of nodes within reach.
+/// Least number of nodes within the range.
 const LEAST: usize = 30;
-/// Largest current of a node that counts, over the largest current of the machine: what lies further away is none of the map's.
+/// Largest current of a node that counts, over the largest current of the machine: nodes further away do not belong to the map.
 const NEAR: f64 = 1.5;
 /// Largest distance from a current to a node, over the largest current.
 const HOLE: f64 = 0.2;
 /// Largest rms of the nodes that are left out, and largest deviation of one node from the fit, as shares of the largest flux linkage.
 const MOST_RMS: f64 = 0.01;
 const MOST: f64 = 0.05;
-/// Weights of the change of the flux linkages' bends beside a node's residual, of which the one that foretells left-out nodes best is taken.
+/// Weights of the change of the flux linkages' bends relative to a node's residual; the weight that predicts left-out nodes best is used.
 const SMOOTH: [f64; 7] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 /// Share by which the polynomial's rectangle is larger than the nodes'.
 const MARGIN: f64 = 0.02;
 /// Steps of the grid up to the largest current, and beyond it.
 const STEPS: i32 = 25;
 const MORE: i32 = 2;
-/// Current over the largest one up to which the polynomial is the map, as far as there are nodes: beyond it goes on straight.
+/// Current over the largest one up to which the polynomial is the map, as far as there are nodes: beyond it the map continues straight.
 const KNOWN: f64 = 1.1;
 
 /// A polynomial, and its deviations from the nodes, along d and q, in Wb.
 struct Found {
     coenergy: Polynomial,
     left_wb: Vec<[f64; 2]>,
-    /// The same of each node as the others alone foretell it.
+    /// The same for each node, as predicted by the others alone.
     left_out_wb: Vec<[f64; 2]>,
 }
 
@@ -41,7 +41,7 @@ struct Left {
     rms: f64,
     left_out: f64,
     worst: f64,
-    /// The line of the worst.
+    /// The line of the worst one.
     line: u64,
 }
 
@@ -54,11 +54,11 @@ fn rms(pairs: &[[f64; 2]]) -> f64 {
     (pairs.iter().map(|[d, q]| d * d + q * q).sum::<f64>() / pairs.len() as f64).sqrt()
 }
 
-/// The map of samples up to a largest current, in A, and the words of what the fit leaves. Of the polynomials that are near enough to the nodes it is the
-/// one that foretells left-out nodes best among those that `check` takes for a machine's.
+/// The map of samples up to a largest current, in A, and a description of the fit's residual. Among the polynomials that are close enough to the nodes it
+/// is the one that predicts left-out nodes best of those that `check` accepts as a machine's.
 ///
 /// # Errors
-/// The reason for which they are no machine's, or too few.
+/// The reason why they are no machine's, or too few.
 pub fn fitted(
     samples: &[Sample],
     most_a: f64,
@@ -147,7 +147,7 @@ impl Found {
 }
 
 impl Left {
-    /// The check that this is noise.
+    /// Checks that this is noise.
     fn check(&self) -> Result<()> {
         ensure!(
             self.left_out <= MOST_RMS && self.worst <= MOST,
@@ -172,7 +172,7 @@ impl Left {
     }
 }
 
-/// The map on a grid up to the largest current and a little more, along +d as far as there are nodes; beyond `from_a` it goes on straight.
+/// The map on a grid up to the largest current and a little more, along +d as far as there are nodes; beyond `from_a` it continues straight.
 fn map(coenergy: &Polynomial, (most_a, from_a): (f64, f64), last_a: f64) -> FluxMap {
     let step_a = most_a / f64::from(STEPS);
     let last = (last_a / step_a + 1e-6).floor().clamp(0.0, f64::from(STEPS + MORE)) as i32;

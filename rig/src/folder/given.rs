@@ -1,4 +1,4 @@
-//! The limits of machine and inverter that a user gives with every folder that is made.
+//! The limits of machine and inverter that a user gives for every new folder.
 
 use crate::options::finite;
 use anyhow::{Result, ensure};
@@ -28,7 +28,7 @@ pub struct Given {
     /// Highest DC-link voltage in normal operation, in V; default 1.2 of the nominal one.
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
     pub udc_max: Option<f64>,
-    /// Voltage of a Z-source nine-switch inverter's source, in V, instead of a link's: shoot-through makes 4/3 of it of the capacitors' voltage, 3/2 at most.
+    /// Voltage of a Z-source nine-switch inverter's source, in V, instead of a link's: shoot-through raises the capacitors' voltage to 4/3 of it, 3/2 at most.
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true, conflicts_with_all = ["udc", "udc_min", "udc_max"])]
     pub zs9_source: Option<f64>,
     /// Largest speed, in r/min.
@@ -37,13 +37,13 @@ pub struct Given {
     /// Highest switching frequency of a device, in Hz.
     #[arg(long, value_name = "HZ", value_parser = finite, allow_negative_numbers = true)]
     pub max_switching_hz: f64,
-    /// Inertia of the rotor and what it drives, in kg·m²; without it full torque takes it to the largest speed in a second.
+    /// Inertia of the rotor and what it drives, in kg·m²; without it full torque reaches the largest speed in a second.
     #[arg(long, value_name = "KG_M2", value_parser = finite, allow_negative_numbers = true)]
     pub inertia: Option<f64>,
     /// Name of the machine; default that of the folder.
     #[arg(long)]
     pub name: Option<String>,
-    /// The folder to make. One that is there may hold a machine's two files, which are replaced, and nothing else.
+    /// The folder to make. An existing one may contain a machine's two files, which are replaced, and nothing else.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Print the ratings as JSON.
@@ -60,10 +60,10 @@ pub struct Range(pub &'static str, pub f64, pub f64, pub f64, pub &'static str);
 /// Least number that counts as above 0.
 pub const ABOVE_ZERO: f64 = 1e-9;
 
-/// The check that values are within their ranges.
+/// Checks that values are within their ranges.
 ///
 /// # Errors
-/// The first that is not, by its option.
+/// The first value that is not, by its option.
 pub fn check(ranges: &[Range]) -> Result<()> {
     for Range(option, value, least, most, unit) in ranges {
         let from = if *least == ABOVE_ZERO { "above 0,".to_owned() } else { format!("from {least}") };
@@ -90,7 +90,7 @@ impl Given {
         self.zs9_source.map_or(self.link_v()[2], |source_v| CAPACITORS[2] * source_v)
     }
 
-    /// The option that tells the voltage, as it was given.
+    /// The option that gives the voltage, as it was given.
     pub fn voltage_option(&self) -> String {
         match self.zs9_source {
             Some(source_v) => format!("--zs9-source {source_v}"),
@@ -108,13 +108,13 @@ impl Given {
         speed_rpm * f64::from(self.pole_pairs) * TAU / 60.0
     }
 
-    /// The name: the one that was said, or the folder's.
+    /// The name: the given one, or the folder's.
     pub fn name(&self) -> String {
         let folder = || self.out.file_name().map(|name| name.to_string_lossy().into_owned());
         self.name.clone().or_else(folder).unwrap_or_else(|| "machine".to_owned())
     }
 
-    /// The check of all of them, by themselves and together.
+    /// Checks all of them, each by itself and together.
     ///
     /// # Errors
     /// The first option that makes no sense.
@@ -150,7 +150,7 @@ impl Given {
         Ok(())
     }
 
-    /// The options as they were given, but for the folder.
+    /// The options as they were given, except the folder.
     pub fn told(&self) -> String {
         let Self { pole_pairs, rs, max_current, max_speed_rpm, max_switching_hz, .. } = self;
         let optional = [("udc-min", self.udc_min), ("udc-max", self.udc_max), ("inertia", self.inertia)];

@@ -1,4 +1,4 @@
-//! The head of another tool's flux map: which column is which, in which unit.
+//! The head of another tool's flux map: the quantity and the unit of each column.
 
 /// Quantities, in the order in which their columns are kept.
 pub const QUANTITIES: [&str; 4] = ["id", "iq", "psi_d", "psi_q"];
@@ -7,20 +7,20 @@ pub const MAGNITUDE: usize = 4;
 /// See [`MAGNITUDE`].
 pub const ANGLE: usize = 5;
 
-/// A column: its name in the file, the quantity, and the factor that makes its values A, Wb or rad, peak.
+/// A column: its name in the file, its quantity, and the factor that converts its values to A, Wb or rad, peak.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// The name, as it stands in the file.
+    /// The name as it appears in the file.
     pub name: String,
     /// Place in [`QUANTITIES`], or [`MAGNITUDE`], or [`ANGLE`].
     pub quantity: usize,
-    /// Peak value in A, Wb or rad of a one in the file.
+    /// Peak value in A, Wb or rad of a value of one in the file.
     pub factor: f64,
     /// `true` if the name says the unit.
     pub has_unit: bool,
 }
 
-/// Words of a name that say no more than the others do.
+/// Words of a name that carry no information of their own.
 const FILLERS: [&str; 13] = [
     "axis",
     "stator",
@@ -36,7 +36,7 @@ const FILLERS: [&str; 13] = [
     "value",
     "winding",
 ];
-/// Words for a current and for a flux linkage, which stand before or behind the axis' letter.
+/// Words for a current and for a flux linkage, which stand before or after the axis' letter.
 const CURRENTS: [&str; 4] = ["i", "is", "current", "statorcurrent"];
 const FLUXES: [&str; 16] = [
     "psi",
@@ -56,7 +56,7 @@ const FLUXES: [&str; 16] = [
     "φ",
     "coilflux",
 ];
-/// Names of the axes behind those words: of a complex number, d is the real part.
+/// Names of the axes after those words: of a complex number, d is the real part.
 const AXES: [[&str; 4]; 2] = [["d", "ds", "dqreal", "dqre"], ["q", "qs", "dqimag", "dqim"]];
 /// Names of a current's magnitude and of its angle.
 const MAGNITUDES: [&str; 9] =
@@ -77,7 +77,7 @@ const ANGLES: [&str; 14] = [
     "gammaangle",
     "iangle",
 ];
-/// Units, without blanks, and what one of them is in A, Wb or rad.
+/// Units, without blanks, and the value of one of them in A, Wb or rad.
 type Units = &'static [(&'static str, f64)];
 const CURRENT_UNITS: Units =
     &[("a", 1.0), ("ma", 1e-3), ("ka", 1e3), ("amp", 1.0), ("amps", 1.0), ("ampere", 1.0)];
@@ -108,10 +108,10 @@ fn words(text: &str) -> impl Iterator<Item = String> + '_ {
     text.split(|letter: char| !letter.is_alphanumeric()).filter(|part| !part.is_empty()).map(str::to_owned)
 }
 
-/// The meaning of a column by its name; nothing where it is none of the quantities. `rms` holds where the name does not say.
+/// The meaning of a column by its name; `None` if it is none of the quantities. `rms` applies if the name does not say.
 ///
 /// # Errors
-/// A unit in brackets that is none of the quantity's.
+/// A unit in brackets that does not belong to the quantity.
 pub fn column(name: &str, rms: bool) -> Result<Option<Column>, String> {
     let lower = name.trim().trim_matches('"').to_lowercase().replace('°', "deg");
     let parts: Vec<&str> = lower.split(['(', '[', '{']).collect();
@@ -149,7 +149,7 @@ pub fn column(name: &str, rms: bool) -> Result<Option<Column>, String> {
     Ok(None)
 }
 
-/// Takes the word for rms (`true`) or peak out of the words; `arms` is a unit too.
+/// Removes the word for rms (`true`) or peak from the words; `arms` is a unit too.
 fn amplitude(words: &mut Vec<String>) -> Option<bool> {
     if let Some(arms) = words.iter_mut().find(|word| ["arms", "apk", "apeak"].contains(&word.as_str())) {
         let rms = arms == "arms";

@@ -1,4 +1,4 @@
-//! A flux map as another tool writes it.
+//! A flux map written by another tool.
 
 use super::axes::{self, GAP, SHORT};
 use super::fitted::fitted;
@@ -19,14 +19,14 @@ use tractive_tablegen::FluxMap;
 #[derive(Clone, Debug, Args)]
 pub struct Import {
     /// The map: a CSV with currents and flux linkages of both axes in named columns, in any order, with their units (`Id [A]`, `psi_q_mWb`,
-    /// `Flux Linkage D (Vs)`; A and Wb where none is said); the current's magnitude and angle (`Is`, `gamma [deg]`) may stand for both currents.
-    /// Further columns are left out.
+    /// `Flux Linkage D (Vs)`; A and Wb if none is given); the current's magnitude and angle (`Is`, `gamma [deg]`) may replace both currents. Further
+    /// columns are ignored.
     #[arg(value_name = "MAP.csv")]
     pub map: PathBuf,
     /// The meaning of its axes and signs.
     #[command(flatten)]
     pub reading: Reading,
-    /// Values are rms where their column does not say peak or rms.
+    /// Values are rms if their column does not say peak or rms.
     #[arg(long)]
     pub rms: bool,
     /// Factor of all flux linkages, for a map of one slot, one turn or another length.
@@ -37,9 +37,9 @@ pub struct Import {
     pub given: Given,
 }
 
-/// Deviation from ψ_d even and ψ_q odd in i_q that is measurement, as a share of the largest flux linkage.
+/// Deviation from ψ_d even and ψ_q odd in i_q that counts as measurement error, as a share of the largest flux linkage.
 const SYMMETRY: f64 = 0.01;
-/// Steps of the grid up to the largest current, and beyond it at most.
+/// Steps of the grid up to the largest current, and most steps beyond it.
 const STEPS: i32 = 25;
 const BEYOND: i32 = 2;
 
@@ -60,10 +60,10 @@ impl Import {
         ratings.say(&self.given, &fit.into_iter().chain(question).collect::<Vec<_>>())
     }
 
-    /// The map, and the words of its fit if it had to be fitted.
+    /// The map, and a description of its fit if it had to be fitted.
     ///
     /// # Errors
-    /// The reason for which it is no machine's, and where another reading of axes and signs would make it one, that.
+    /// The reason why it is no machine's; if another reading of axes and signs would make it one, that reading.
     fn taken(&self, samples: &Samples) -> Result<(FluxMap, Option<String>)> {
         self.read_as(&self.reading, samples).map_err(|reason| {
             let other =
@@ -76,7 +76,7 @@ impl Import {
         })
     }
 
-    /// The map with its axes and signs as a reading has them: its own nodes, or where those are no full grid or too rough for a machine's, a fit.
+    /// The map with axes and signs according to a reading: its own nodes, or, if those are no full grid or too rough for a machine's, a fit.
     fn read_as(&self, reading: &Reading, samples: &Samples) -> Result<(FluxMap, Option<String>)> {
         let rows = reading.of(samples, self.flux_factor);
         let grid = Rectangle::of(&rows, &self.map);
@@ -101,11 +101,11 @@ impl Import {
         Ok(map)
     }
 
-    /// The map on the project's grid, iq of both signs: its own nodes where they are even, otherwise between them.
+    /// The map on the project's grid, iq of both signs: its own nodes if they are even, otherwise interpolated.
     fn resampled(&self, half: &Rectangle) -> FluxMap {
         let most_a = self.given.max_current;
         let ends = half.ends();
-        // An axis that ends at the largest current, or at none, but for rounding, ends there.
+        // An axis that ends at the largest current, or at zero, within rounding, ends there exactly.
         let full = |ends: f64| {
             [most_a, 0.0, -most_a]
                 .into_iter()
@@ -128,10 +128,10 @@ impl Import {
         mirrored(id_a, &iq_a, &psi_d, &psi_q)
     }
 
-    /// The check that the table generator takes a map.
+    /// Checks that the table generator accepts a map.
     fn check(&self, map: &FluxMap) -> Result<()> {
         let taken = FluxMap::parse(write::csv(map, "").as_bytes(), &self.map);
-        // Its lines are none of the file's.
+        // Its line numbers do not refer to the file.
         taken.map(drop).map_err(|error| anyhow!("{}: {}", self.map.display(), error.problem))
     }
 
@@ -148,7 +148,7 @@ impl Import {
     }
 }
 
-/// So many values from one to another, evenly.
+/// This many values from one to another, evenly spaced.
 fn even(first: f64, last: f64, count: usize) -> Vec<f64> {
     let step = (last - first) / (count - 1) as f64;
     (0..count).map(|k| write::digits(first + step * k as f64)).collect()

@@ -31,23 +31,23 @@ use clap::Subcommand;
 pub enum MachineCommand {
     /// A machine folder from nameplate values.
     ///
-    /// Currents, voltages and flux linkages of phases are peak values. The d axis lies along the magnets' flux: L_d is the inductance
-    /// along the magnets and L_q the one across them, so L_q is at least L_d, and in a machine of reluctance alone L_d is the smaller
-    /// one. Data of a SynRM or PMaSynRM whose d axis lies along the least reluctance (L_d above L_q, magnets along −q) has L_d and L_q
-    /// the other way round: give its L_q as --ld and its L_d as --lq; ψ_f stays positive.
+    /// Currents, voltages and flux linkages of phases are peak values. The d axis lies along the magnets' flux: L_d is the inductance along the
+    /// magnets and L_q the one across them, so L_q is at least L_d; in a pure reluctance machine L_d is the smaller one. For a SynRM or PMaSynRM
+    /// whose d axis lies along the least reluctance (L_d above L_q, magnets along −q) L_d and L_q are swapped: give its L_q as --ld and its L_d as
+    /// --lq; ψ_f stays positive.
     New(Nameplate),
     /// A machine folder from a flux map of another tool.
     ///
-    /// The map's nodes stand on a rectangular grid, even or not, in any order. An even one is taken as it is; between uneven nodes the map is
-    /// interpolated. Nodes anywhere else, and those that are too rough for a machine's, are fitted as the gradient of one co-energy, and what the fit
-    /// leaves is printed. Of a map with one sign of iq the other is its mirror image. Nothing is written unless the table generator takes the
+    /// The map's nodes lie on a rectangular grid, even or not, in any order. An even one is used as it is; between uneven nodes the map is
+    /// interpolated. Nodes anywhere else, and those that are too rough for a machine's, are fitted as the gradient of one co-energy, and the fit's
+    /// residual is printed. For a map with one sign of iq the other is its mirror image. Nothing is written unless the table generator accepts the
     /// folder: flux linkage that rises with its own current, the same cross inductance both ways, one current for one flux linkage.
     Import(Import),
-    /// A page about a machine: its flux linkages, its currents, torque and power over speed, and what each limit costs.
+    /// A page about a machine: its flux linkages, its currents, torque and power over speed, and the cost of each limit.
     Show(Show),
 }
 
-/// Does what the command says.
+/// Executes the command.
 ///
 /// # Errors
 /// One line that names option or file, value and what is allowed; then nothing was written.

@@ -18,12 +18,12 @@ pub struct Nameplate {
     /// Inductance across the magnets' flux, in H.
     #[arg(long, value_name = "H", value_parser = finite, allow_negative_numbers = true)]
     pub lq: f64,
-    /// Flux linkage of the magnets, peak, in Wb: peak phase voltage of the turning machine without current, over its electrical angular
-    /// speed; 0 without magnets.
+    /// Flux linkage of the magnets, peak, in Wb: peak phase voltage of the turning machine without current, divided by its electrical angular speed;
+    /// 0 without magnets.
     #[arg(long, value_name = "WB", value_parser = finite, allow_negative_numbers = true)]
     pub psi_f: f64,
-    /// Share of itself that the larger inductance is left with where the largest current flows along its axis, 0.2 ..= 1; both inductances
-    /// fall with the energy of the current, L = L₀/√(1 + E/E₀) with E = ½ (L_d i_d² + L_q i_q²), and the magnets' flux stays.
+    /// Share of the larger inductance that remains when the largest current flows along its axis, 0.2 ..= 1; both inductances fall with the energy of
+    /// the current, L = L₀/√(1 + E/E₀) with E = ½ (L_d i_d² + L_q i_q²), and the magnets' flux stays.
     #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = finite, allow_negative_numbers = true)]
     pub saturation: f64,
     /// The limits of machine and inverter.
@@ -35,8 +35,8 @@ pub struct Nameplate {
 const STEPS: i32 = 25;
 /// Steps beyond it.
 const BEYOND: i32 = 2;
-/// Steps along +d: as far as the pulses that find the angle at standstill go. Beyond the grid the map goes on straight, which would show them magnets on the
-/// wrong side.
+/// Steps along +d: as far as the pulses that find the angle at standstill go. Beyond the grid the map continues straight, which would make them detect
+/// magnets on the wrong side.
 const POSITIVE: i32 = (PULSE_SHARE * STEPS as f32) as i32 + 1;
 
 impl Nameplate {

@@ -1,4 +1,4 @@
-//! The ratings that follow from a flux map and the limits, and `machine.toml` of both.
+//! The ratings that follow from a flux map and the limits, and the `machine.toml` made of both.
 
 use super::given::Given;
 use super::ripple::{MOST_TRIP, ROOM, trip_current_a};
@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use tractive::time::Clock;
 use tractive_tablegen::{FluxMap, MachineFolder, Optimum, SmoothMap};
 
-/// Ratings that follow.
+/// The resulting ratings.
 #[derive(serde::Serialize)]
 pub struct Ratings {
     max_torque_nm: f64,
@@ -19,26 +19,26 @@ pub struct Ratings {
     corner_rpm: f64,
     rated_torque_nm: f64,
     rated_speed_rpm: f64,
-    /// Flux linkage without current, in Wb.
+    /// Flux linkage at zero current, in Wb.
     magnet_wb: f64,
-    /// The current that the drive trips at, in A, where the ripple leaves the usual one no room.
+    /// The current at which the drive trips, in A, if the ripple leaves no room with the usual one.
     trip_current_a: Option<f64>,
 }
 
 /// Rated torque, as a share of the largest, and rated speed over the corner of the largest: a machine's usual proportions.
 const RATED_TORQUE: f64 = 0.7;
 const RATED_SPEED: f64 = 1.05;
-/// Share of the largest speed below which no machine's full torque ends: its values are in other units.
+/// Share of the largest speed below which no machine's full torque ends: then its values are in other units.
 const ODD_CORNER: f64 = 0.02;
-/// Share of the largest speed that a machine's values are likely of other units where it cannot hold more.
+/// Share of the largest speed below which a machine's values are probably in other units if it cannot hold more.
 const ODD_SPEED: f64 = 0.1;
-/// The question that goes with such values.
+/// The question that accompanies such values.
 const UNITS: &str = "are inductances in H, flux linkages in Wb (a column psi_d [mWb] has thousandths)?";
-/// Ten minutes of full torque are the longest that a rotor may take to its largest speed.
+/// A rotor may take at most ten minutes of full torque to reach its largest speed.
 const LONGEST_S: f64 = 600.0;
 
 impl Ratings {
-    /// Of a map within the limits.
+    /// Made from a map within the limits.
     ///
     /// # Errors
     /// The option that leaves the machine no torque, or no way to hold its largest speed.
@@ -75,13 +75,13 @@ impl Ratings {
         })
     }
 
-    /// The two files of a folder with this `flux_map.csv`; `command` are the words that made it. The ripple of the machine's pulses is looked at, and where
-    /// it needs room a trip of its own chosen.
+    /// The two files of a folder with this `flux_map.csv`; `command` is the command line that made it. The ripple of the machine's pulses is checked, and
+    /// if it needs room, a separate trip level is chosen.
     ///
     /// # Errors
-    /// A ripple that no trip leaves room.
+    /// A ripple for which no trip level leaves room.
     pub fn contents(&mut self, given: &Given, command: &str, map: String) -> Result<Contents> {
-        // What the generator or the drive refuses is told where it is written.
+        // Whatever the generator or the drive refuses is reported when it is written.
         let folder = MachineFolder::parse(&self.toml(given, command), &map).ok();
         let machine = folder.map(Machine::of).filter(|machine| machine.tables.check().is_ok());
         self.trip_current_a = machine.and_then(|machine| trip_current_a(&machine)).map(rounded_down);
@@ -133,7 +133,7 @@ impl Ratings {
         toml(&given.name(), &format!("machine {command}"), &lines)
     }
 
-    /// Says what the machine is, and what there is to note of its map: a few lines, or where it was asked for, JSON.
+    /// Prints a description of the machine, and notes on its map: a few lines, or JSON if requested.
     pub fn say(&self, given: &Given, notes: &[String]) -> Result<()> {
         if given.json {
             let mut ratings = serde_json::to_value(self)?;
@@ -147,7 +147,7 @@ impl Ratings {
         Ok(())
     }
 
-    /// The ratings in a few lines, and what they mean for the inverter.
+    /// The ratings in a few lines, and their consequences for the inverter.
     fn told(&self, given: &Given) -> String {
         let Self { max_torque_nm, max_power_w, corner_rpm, magnet_wb, .. } = self;
         let mut text = format!(
@@ -172,7 +172,7 @@ impl Ratings {
                 given.max_switching_hz.ceil()
             );
         }
-        // Line to line, peak: what the diodes rectify.
+        // Line to line, peak: the voltage that the diodes rectify.
         let emf_v = 3.0_f64.sqrt() * given.omega(given.max_speed_rpm) * magnet_wb;
         let highest_v = digits(given.highest_v());
         let whose = given.zs9_source.map_or(("the link's", "it"), |_| ("the capacitors'", "them"));
@@ -212,7 +212,7 @@ fn voltage_v(map: &SmoothMap, (id, iq): (f64, f64), omega: f64, rs: f64) -> f64 
     (rs * id - omega * at.psi_q_wb).hypot(rs * iq + omega * at.psi_d_wb)
 }
 
-/// Speed up to which a current needs no more than the nominal link gives, in r/min, at most the largest.
+/// Speed up to which a current needs no more than the nominal link's voltage, in r/min, at most the largest.
 fn corner_rpm(map: &SmoothMap, current: (f64, f64), given: &Given) -> f64 {
     let (mut low, mut high) = (0.0, given.max_speed_rpm);
     let fits = |rpm: f64| voltage_v(map, current, given.omega(rpm), given.rs) <= given.voltage_v();
@@ -226,7 +226,7 @@ fn corner_rpm(map: &SmoothMap, current: (f64, f64), given: &Given) -> f64 {
     low
 }
 
-/// Current along d, in A, that leaves the least flux linkage; of inductances that are a thousand times too large it lies between two steps of any scan.
+/// Current along d, in A, with the least flux linkage; for inductances that are a thousand times too large it lies between two steps of any scan.
 fn weakened_a(map: &SmoothMap, max_current_a: f64) -> f64 {
     let (mut low, mut high) = (-max_current_a, 0.0);
     for _ in 0..60 {
@@ -236,7 +236,7 @@ fn weakened_a(map: &SmoothMap, max_current_a: f64) -> f64 {
     high
 }
 
-/// At the largest speed some current must leave a voltage that the nominal link gives.
+/// Checks that some current at the largest speed needs no more voltage than the nominal link gives.
 fn check_speed(map: &SmoothMap, given: &Given) -> Result<()> {
     const STEPS: i32 = 200;
     let weakened_a = weakened_a(map, given.max_current);

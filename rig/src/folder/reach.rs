@@ -1,7 +1,7 @@
 //! The circle of currents that samples cover.
 
-/// The radius, in A, of the largest circle about no current whose part with i_d ≤ 0 lies within the convex hull of the samples and their mirror images
-/// at −i_q, or at most `gap_a` outside; and the direction in which it ends. Samples that end before i_d = 0 are taken as if they were shifted there.
+/// The radius, in A, of the largest circle about zero current whose part with i_d ≤ 0 lies within the convex hull of the samples and their mirror images at
+/// −i_q, or at most `gap_a` outside; and the direction in which it is limited. Samples that end before i_d = 0 are treated as if they were shifted there.
 pub fn reach_a(currents: impl Iterator<Item = (f64, f64)> + Clone, gap_a: f64) -> (f64, (f64, f64)) {
     let before = currents.clone().map(|(id, _)| -id).fold(f64::INFINITY, f64::min).max(0.0);
     let both = currents.flat_map(|(id, iq)| [(id + before, iq), (id + before, -iq)]);
@@ -9,7 +9,7 @@ pub fn reach_a(currents: impl Iterator<Item = (f64, f64)> + Clone, gap_a: f64) -
     let hull = hull(points);
     let edges = hull.iter().zip(hull.iter().cycle().skip(1));
     let end = |(a, b): (&(f64, f64), &(f64, f64))| {
-        // The way out of an edge, counter-clockwise.
+        // The outward direction of an edge, counter-clockwise.
         let (d, q) = (b.1 - a.1, a.0 - b.0);
         let length = d.hypot(q);
         let (d, q) = (d / length, q / length);
@@ -21,8 +21,8 @@ pub fn reach_a(currents: impl Iterator<Item = (f64, f64)> + Clone, gap_a: f64) -
     edges.map(end).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, (-1.0, 0.0)))
 }
 
-/// The current, in A, with i_d ≤ 0 and i_q ≥ 0 within a circle, which has no sample or mirror image of one within `gap_a`: of those the one that is farthest
-/// from all.
+/// The current, in A, with i_d ≤ 0 and i_q ≥ 0 within a circle, which has no sample or mirror image of one within `gap_a`: among those the one farthest from
+/// all.
 pub fn hole_a(
     currents: impl Iterator<Item = (f64, f64)> + Clone,
     circle_a: f64,

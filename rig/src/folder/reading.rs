@@ -1,4 +1,4 @@
-//! The ways in which a map's axes and signs may be meant.
+//! The possible meanings of a map's axes and signs.
 
 use super::header::QUANTITIES;
 use super::samples::{Sample, Samples};
@@ -7,13 +7,13 @@ use clap::{Args, ValueEnum};
 /// The direction of a map's d axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DAxis {
-    /// Along the magnets' flux, or of a machine without magnets along the larger reluctance.
+    /// Along the magnets' flux, or for a machine without magnets along the larger reluctance.
     Magnet,
     /// Along the least reluctance, with the magnets along −q: as SynRM and PMaSynRM are often described.
     Reluctance,
 }
 
-/// The axis from which the angle of a polar map counts.
+/// The axis from which the angle of a polar map is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum AngleFrom {
     /// From q towards −d, as a phase advance.
@@ -28,16 +28,16 @@ pub struct Reading {
     /// Direction of the map's d axis.
     #[arg(long, value_enum, default_value = "magnet")]
     pub d_axis: DAxis,
-    /// The map's axis from which the angle of a current counts that has magnitude and angle.
+    /// The map's axis from which the angle is measured, if currents are given as magnitude and angle.
     #[arg(long, value_enum, default_value = "q")]
     pub angle_from: AngleFrom,
-    /// Quantities that the map counts the other way round.
+    /// Quantities that the map counts with the opposite sign.
     #[arg(long, value_delimiter = ',', value_parser = QUANTITIES, value_name = "QUANTITY,…")]
     pub negate: Vec<String>,
 }
 
-/// Every way in which a map's signs may be meant, but for a mirror image, which is the same machine: a quantity that is counted the other way round, a turn of the axes
-/// by half a turn, an exchange of motor and generator. The quantities that change their sign, the fewest first.
+/// Every possible meaning of a map's signs, except mirror images, which are the same machine: a quantity counted with the opposite sign, a rotation of the axes
+/// by half a turn, an exchange of motor and generator. Each lists the quantities that change their sign, the fewest first.
 const MAGNET_SIGNS: [&[&str]; 8] = [
     &[],
     &["id"],
@@ -81,14 +81,14 @@ impl Reading {
         let [id, iq, psi_d, psi_q] = values;
         match self.d_axis {
             DAxis::Magnet => [id, iq, flux * psi_d, flux * psi_q],
-            // −q is where the magnets are, and d a quarter of a turn ahead of it.
+            // The magnets lie along −q, and d is a quarter of a turn ahead of it.
             DAxis::Reluctance => [-iq, id, -flux * psi_q, flux * psi_d],
         }
-        // There is one zero.
+        // Adding zero turns −0 into 0.
         .map(|value| value + 0.0)
     }
 
-    /// The other meanings that a map may have.
+    /// The other possible meanings of a map.
     pub fn others(&self, is_polar: bool) -> impl Iterator<Item = Self> + '_ {
         let angles: &[AngleFrom] = if is_polar { &[AngleFrom::Q, AngleFrom::D] } else { &[AngleFrom::Q] };
         let axes = [(DAxis::Magnet, MAGNET_SIGNS), (DAxis::Reluctance, RELUCTANCE_SIGNS)];
@@ -105,7 +105,7 @@ impl Reading {
         all.filter(move |other| other != self)
     }
 
-    /// The options of this reading, each behind a blank; none where all are the usual ones.
+    /// The options of this reading, each after a blank; none if all are the usual ones.
     pub fn told(&self) -> String {
         let mut text = String::new();
         if self.d_axis == DAxis::Reluctance {

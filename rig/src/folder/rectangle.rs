@@ -15,16 +15,16 @@ pub struct Rectangle {
     lines: Vec<u64>,
 }
 
-/// Currents this much apart, as a share of the axis, are the same one, rounded or found by an iteration.
+/// Currents that differ by this much, as a share of the axis, count as the same one, rounded or found by an iteration.
 const SAME: f64 = 1e-4;
-/// Deviation from an even grid that is rounding, as a share of the step.
+/// Deviation from an even grid that counts as rounding, as a share of the step.
 const EVEN: f64 = 1e-3;
 
 impl Rectangle {
-    /// Of samples in any order.
+    /// Made of samples in any order.
     ///
     /// # Errors
-    /// The line of a node that is there twice with other values, the currents of one that is missing, an axis with too few values.
+    /// The line of a node that occurs twice with different values, the currents of a missing one, an axis with too few values.
     pub fn of(samples: &[Sample], path: &Path) -> Result<Self> {
         let file = path.display();
         let (id_a, iq_a) = (axis(samples, 0), axis(samples, 1));
@@ -62,10 +62,10 @@ impl Rectangle {
         Ok(Self { psi_d: whole(2), psi_q: whole(3), lines, id_a, iq_a })
     }
 
-    /// Its half with iq ≥ 0: where it has both signs their mean, where it has one only that one.
+    /// Its half with iq ≥ 0: the mean of both signs if it has them, otherwise the one that it has.
     ///
     /// # Errors
-    /// The line of a node that is not the image of its twin, an axis that does not begin or pass at 0.
+    /// The line of a node that is not the image of its twin, an axis that does not begin at or pass 0.
     pub fn folded(&self, tolerance: f64, path: &Path) -> Result<Self> {
         let file = path.display();
         let (first, last) = (self.iq_a[0], self.iq_a[self.iq_a.len() - 1]);
@@ -94,10 +94,10 @@ impl Rectangle {
         Ok(Self { id_a: self.id_a.clone(), iq_a, psi_d, psi_q, lines })
     }
 
-    /// The check that each flux linkage rises with its own current.
+    /// Checks that each flux linkage rises with its own current.
     ///
     /// # Errors
-    /// The line of a node that is not above the one before it.
+    /// The line of a node that is not above the previous one.
     pub fn check_rising(&self, path: &Path) -> Result<()> {
         let columns = self.iq_a.len();
         for node in 0..self.lines.len() {
@@ -139,8 +139,7 @@ impl Rectangle {
         })
     }
 
-    /// Flux linkages ψ_d and ψ_q on another grid, row-major: along id first, then along iq, by cubics that rise and fall only where their
-    /// nodes do.
+    /// Flux linkages ψ_d and ψ_q on another grid, row-major: first along id, then along iq, by cubics that rise and fall only where their nodes do.
     pub fn at(&self, id_a: &[f64], iq_a: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let columns = self.iq_a.len();
         let surface = |values: &[f64]| {
@@ -166,7 +165,7 @@ struct Twins<'a> {
 }
 
 impl Twins<'_> {
-    /// The mean of a node at iq ≥ 0 and the image of its twin, or the one of both that is there, and its line.
+    /// The mean of a node at iq ≥ 0 and the image of its twin, or the one of both that exists, and its line.
     fn mean(&self, row: usize, iq: f64) -> Result<([f64; 2], u64)> {
         let Self { of, same, tolerance_wb, path } = *self;
         let file = path.display();
@@ -213,7 +212,7 @@ fn axis(samples: &[Sample], place: usize) -> Vec<f64> {
     values
 }
 
-/// The index of the value that is nearest.
+/// The index of the nearest value.
 fn nearest(axis: &[f64], value: f64) -> usize {
     let after = axis.partition_point(|one| *one < value).min(axis.len() - 1);
     let before = after.saturating_sub(1);
@@ -243,7 +242,7 @@ fn between(x: &[f64], y: &[f64], wanted: &[f64]) -> Vec<f64> {
     wanted.iter().map(at).collect()
 }
 
-/// The slope at an end: of the parabola through three nodes, or none where that would turn round.
+/// The slope at an end: that of the parabola through three nodes, or zero if it would reverse the direction.
 fn end_slope(x: &[f64], y: &[f64], is_first: bool) -> f64 {
     let last = x.len() - 1;
     let [a, b, c] = if is_first { [0, 1, 2] } else { [last, last - 1, last - 2] };

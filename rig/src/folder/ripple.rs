@@ -1,4 +1,4 @@
-//! The current that the pulses make at full torque: the operating point's, and the ripple of its mode.
+//! The current from the pulses at full torque: the operating point's current plus the ripple of its mode.
 
 use super::show::View;
 use crate::bound::Operation;
@@ -6,25 +6,25 @@ use crate::machine::Machine;
 use crate::options::usual_min_pulse_us;
 use tractive::modulation::{Mode, index_limit};
 
-/// Least distance of the trip from the highest current at full torque, as a share of it: room for steps and changes of mode.
+/// Least margin of the trip above the highest current at full torque, as a share of it: room for steps and changes of mode.
 pub const ROOM: f64 = 0.15;
 
-/// Highest trip that the table generator takes, as a share of the largest current.
+/// Highest trip that the table generator accepts, as a share of the largest current.
 pub const MOST_TRIP: f64 = 4.0;
 
-/// Most carriers in a turn of the voltage: with more of them the ripple is the same, and what the pulses' ticks round adds up to flux linkage that
-/// a drive would take out.
+/// Most carriers in a turn of the voltage: with more of them the ripple is the same, and the rounding of the pulses to ticks adds up to a flux
+/// linkage that a drive would remove.
 const MOST_CARRIERS: f64 = 200.0;
 
-/// The current that the drive trips at, in A, where the machine's own default leaves the ripple no room: in steady state at full torque, of any mode and
-/// link in normal operation, the current stays well below it.
+/// The current at which the drive trips, in A, if the machine's default leaves no room for the ripple: in steady state at full torque, in any mode and
+/// with any link voltage in normal operation, the current stays well below it.
 pub fn trip_current_a(machine: &Machine) -> Option<f64> {
     let trip_a = (1.0 + ROOM) * highest_a(machine);
     (trip_a > machine.folder.parameters.trip_current_a).then_some(trip_a)
 }
 
-/// Highest current of a phase at full torque in steady state, ripple and all, in A: at both ends and in the middle of each mode's speeds, with the
-/// lowest, nominal and highest link.
+/// Highest current of a phase at full torque in steady state, including ripple, in A: at both ends and in the middle of each mode's speed range, with
+/// the lowest, nominal and highest link voltage.
 fn highest_a(machine: &Machine) -> f64 {
     let view = View::of(machine);
     let parameters = &machine.folder.parameters;
@@ -39,7 +39,7 @@ fn highest_a(machine: &Machine) -> f64 {
 }
 
 impl View<'_> {
-    /// Highest current of a phase at full torque in a mode, in A, with a link in V; nothing where the mode has no pulses there.
+    /// Highest current of a phase at full torque in a mode, in A, with a link in V; `None` if the mode has no pulses there.
     pub fn peak_a(&self, mode: Mode, speed_rpm: f64, udc_v: f64) -> Option<f64> {
         let index = index_limit(mode, self.rate(speed_rpm), &self.devices);
         let point = self.point(self.machine.envelope_nm(speed_rpm), speed_rpm, udc_v, index);

@@ -14,7 +14,7 @@ pub struct Sample {
     pub line: u64,
     /// Values.
     pub values: [f64; 4],
-    /// Torque in N·m, as the map tells it; no number where it does not.
+    /// Torque in N·m, as given by the map; not a number if it gives none.
     pub torque_nm: f64,
 }
 
@@ -22,7 +22,7 @@ pub struct Sample {
 pub struct Samples {
     /// In the file's order.
     pub rows: Vec<Sample>,
-    /// `true` if currents were magnitude and angle: then the angle counts from q towards −d.
+    /// `true` if currents were given as magnitude and angle: then the angle counts from q towards −d.
     pub is_polar: bool,
 }
 
@@ -32,7 +32,7 @@ const LARGEST: [f64; 6] = [1e5, 1e5, 1e3, 1e3, 1e5, 100.0];
 /// Reads a map.
 ///
 /// # Errors
-/// File, line and column, what stands there and what is allowed.
+/// File, line and column, what is there and what is allowed.
 pub fn read(path: &Path, rms: bool) -> Result<Samples> {
     let file = path.display();
     let text = read_bounded(path).with_context(|| format!("{file}: cannot be read"))?;
@@ -83,14 +83,14 @@ pub fn read(path: &Path, rms: bool) -> Result<Samples> {
     Ok(Samples { rows: rows.into_iter().map(sample).collect(), is_polar })
 }
 
-/// The delimiter of the first line that is no comment.
+/// The delimiter in the first line that is not a comment.
 fn delimiter(text: &[u8]) -> u8 {
     let head = text.split(|byte| *byte == b'\n').find(|line| !line.starts_with(b"#") && line.len() > 1);
     let head = head.unwrap_or_default();
     [b';', b'\t', b',', b' '].into_iter().find(|byte| head.contains(byte)).unwrap_or(b',')
 }
 
-/// The text with single blanks, none about a line, its lines where they were.
+/// The text with single blanks, none around a line, with the same line numbers.
 fn single_blanks(text: &[u8]) -> Vec<u8> {
     let single = |line: &[u8]| {
         let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
@@ -102,11 +102,11 @@ fn single_blanks(text: &[u8]) -> Vec<u8> {
 /// A line's number, its values by quantity, and its torque in N·m.
 type Row = (u64, [f64; 6], f64);
 
-/// The head of a map: its cells, and the places and meanings of the columns that count.
+/// The head of a map: its cells, and the positions and meanings of the columns that count.
 struct Head {
     cells: csv::StringRecord,
     columns: Vec<(usize, Column)>,
-    /// Place and factor of a torque.
+    /// Position and factor of a torque.
     torque: Option<(usize, f64)>,
 }
 
@@ -150,7 +150,7 @@ impl Head {
         Ok(Self { cells, columns, torque })
     }
 
-    /// The head with the units that the line below it holds; nothing where that holds anything else.
+    /// The head with the units in the line below it; `None` if that line holds anything else.
     fn with_units(&self, units: &csv::StringRecord, rms: bool) -> Option<Self> {
         let silent = self.columns.iter().all(|(place, column)| {
             !column.has_unit && units.get(*place).is_some_and(|unit| unit.parse::<f64>().is_err())
@@ -169,7 +169,7 @@ impl Head {
 
     /// A line's number, values and torque.
     fn row(&self, record: &csv::StringRecord, line: u64, delimiter: u8) -> Result<Row> {
-        // An empty one at the end is a delimiter too many.
+        // An empty one at the end comes from a superfluous delimiter.
         let cells = (1..=record.len()).rev().find(|n| !record[n - 1].is_empty()).unwrap_or(0);
         ensure!(
             cells <= self.cells.len(),
@@ -178,7 +178,7 @@ impl Head {
         );
         let number = |place: usize, factor: f64| {
             let field = record.get(place).unwrap_or("");
-            // Where a semicolon parts the columns, a comma may part the decimals.
+            // If a semicolon separates the columns, a comma may be the decimal separator.
             let plain = if delimiter == b';' { field.replace(',', ".") } else { field.to_owned() };
             (field, plain.parse::<f64>().map_or(f64::NAN, |value| value * factor))
         };
@@ -204,7 +204,7 @@ impl Head {
         Ok((line, values, self.torque.map_or(f64::NAN, |(place, factor)| number(place, factor).1)))
     }
 
-    /// The check that angles whose column tells no unit are degrees.
+    /// Checks that angles whose column gives no unit are degrees.
     fn check_angles(&self, rows: &[Row]) -> Result<()> {
         let Some((_, column)) = self.columns.iter().find(|(_, column)| column.quantity == ANGLE) else {
             return Ok(());

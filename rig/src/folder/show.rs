@@ -1,4 +1,4 @@
-//! `machine show`: a page about a machine, its inverter's limits, and what each of them costs.
+//! `machine show`: a page about a machine, its inverter's limits, and the cost of each.
 
 use crate::analysis::Figures;
 use crate::files::write_text;
@@ -43,27 +43,27 @@ const SPEEDS: u32 = 240;
 /// Rows of the table of limits.
 const ROWS: u32 = 12;
 
-/// A speed, and the most torque there: motoring, at the nominal link.
+/// A speed, and the largest torque there: motoring, at the nominal link.
 #[derive(Clone, Debug, Serialize)]
 struct Limits {
     speed_rpm: f64,
-    /// The drive's mode at the most torque.
+    /// The drive's mode at the largest torque.
     mode: &'static str,
-    /// The most within current and voltage, in N·m, and the power of it, in kW.
+    /// The largest torque within current and voltage, in N·m, and its power, in kW.
     most_torque_nm: f64,
     most_power_kw: f64,
-    /// The torque that is left of the machine's largest, lost to the voltage, then to `max_power_w`, in percent of the largest.
+    /// The torque missing from the machine's largest, lost to the voltage, then to `max_power_w`, in percent of the largest.
     lost_to_voltage_percent: f64,
     lost_to_max_power_percent: f64,
-    /// Torque that the mode gives less than square wave would, for its smaller fundamental, in percent of the largest.
+    /// Torque that the mode loses against square wave through its smaller fundamental, in percent of the largest.
     lost_to_mode_percent: f64,
     current_a: f64,
-    /// The highest current of a phase with the ripple of the mode's pulses, in A; nothing where the mode has none.
+    /// The highest current of a phase with the ripple of the mode's pulses, in A; `None` if the mode has none.
     peak_current_a: Option<f64>,
     voltage_v: f64,
 }
 
-/// The use of a mode at the most torque: up to which speed, and why it ends there.
+/// The use of a mode at the largest torque: the speed up to which it is used, and the reason for its end.
 #[derive(Clone, Debug, Serialize)]
 struct ModeLimits {
     mode: &'static str,
@@ -72,13 +72,13 @@ struct ModeLimits {
     to_frequency_hz: f64,
     /// Turn-ons of a device per second at that speed.
     turn_ons_per_s: f64,
-    /// The speed at which its turn-ons reach `max_switching_hz`: no mode of these pulses goes beyond; nothing for a free carrier.
+    /// The speed at which its turn-ons reach `max_switching_hz`: no mode with these pulses goes beyond; `None` for a free carrier.
     switching_allows_rpm: Option<f64>,
     /// Its largest fundamental at that speed, in percent of square wave's.
     largest_voltage_percent: f64,
 }
 
-/// A machine with what is looked up again and again.
+/// A machine with data that is used again and again.
 pub struct View<'a> {
     /// The machine.
     pub machine: &'a Machine,
@@ -110,7 +110,7 @@ impl Show {
     }
 }
 
-/// The usual place of a page about a machine, whatever its name holds.
+/// The usual place of a page about a machine, whatever its name contains.
 pub fn usual_page(what: &str, name: &str) -> PathBuf {
     let plain = |letter: char| if letter.is_alphanumeric() { letter } else { '-' };
     format!("target/tractive/{what}-{}.html", name.chars().map(plain).collect::<String>()).into()
@@ -119,7 +119,7 @@ pub fn usual_page(what: &str, name: &str) -> PathBuf {
 /// The page of a machine.
 ///
 /// # Errors
-/// Where a plot cannot be drawn.
+/// If a plot cannot be drawn.
 pub fn page(machine: &Machine) -> Result<String> {
     let view = View::of(machine);
     let mut page = Page::new(&machine.folder.parameters.name, "no figure: machine and limits");
@@ -147,7 +147,7 @@ impl<'a> View<'a> {
         speed_rpm * TAU / 60.0 * f64::from(self.machine.folder.parameters.pole_pairs)
     }
 
-    /// The point of a torque at a speed, with a link in V of which a mode uses so much.
+    /// The operating point for a torque at a speed, with a link in V of which a mode uses this share.
     pub fn point(&self, torque_nm: f64, speed_rpm: f64, udc_v: f64, modulation_index: f32) -> OperatingPoint {
         let limit = VoltageLimit { udc_v: udc_v as f32, modulation_index, filled: false };
         operating_point(torque_nm as f32, self.omega(speed_rpm) as f32, &limit, self.machine.tables)
@@ -227,7 +227,7 @@ impl<'a> View<'a> {
         );
     }
 
-    /// Flux linkages over their own current, for several of the other.
+    /// Flux linkages over their own current, for several values of the other one.
     fn flux(&self, page: &mut Page) {
         let largest = self.machine.folder.parameters.max_current_a;
         let last_d = self.machine.folder.map.id_a.last().map_or(0.0, |last| last.min(largest));
@@ -264,7 +264,7 @@ impl<'a> View<'a> {
         (self.omega(speed_rpm) / TAU / f64::from(self.clock.ticks_per_s) * 4_294_967_296.0) as f32
     }
 
-    /// The modes that the drive's own schedule wants with a link in V on the way up at full torque and power, each with its first and last speed.
+    /// The modes that the drive's own schedule wants with a link in V with rising speed at full torque and power, each with its first and last speed.
     pub fn modes(&self, udc_v: f64) -> Vec<(Mode, f64, f64)> {
         let mut schedule = Schedule::new(&self.clock);
         let mut used: Vec<(Mode, f64, f64)> = Vec::new();
@@ -347,7 +347,7 @@ impl<'a> View<'a> {
             let modulation_index = index_limit(mode, self.rate(rpm), &self.devices);
             let in_mode_nm = f64::from(self.point(most_nm, rpm, udc_v, modulation_index).torque_nm);
             let envelope_nm = self.machine.envelope_nm(rpm);
-            // To a thousandth: what is less the tables' own rounding makes.
+            // To a thousandth: smaller values come from the tables' own rounding.
             let percent = |nm: f64| (1e5 * nm.max(0.0) / most_nm).round() / 1e3;
             Limits {
                 speed_rpm: rpm,

@@ -1,11 +1,11 @@
-//! A map's own torque beside that of its flux linkages: what both tell of its units.
+//! A map's own torque compared with that of its flux linkages, and the conclusions about its units.
 
 /// Share by which the torques may differ: iron, friction and the teeth's ripple.
 const DIFFERENT: f64 = 0.1;
-/// The same of a ratio from a round number.
+/// The same for the deviation of a ratio from a round number.
 const NEAR: f64 = 0.05;
 
-/// The factor that makes a column's values N·m; nothing where it is no torque.
+/// The factor that converts a column's values to N·m; `None` if it is no torque.
 pub fn factor(name: &str) -> Option<f64> {
     let letters: String = name.to_lowercase().chars().filter(|letter| letter.is_alphabetic()).collect();
     let (before, unit) = letters.split_once("torque")?;
@@ -15,8 +15,8 @@ pub fn factor(name: &str) -> Option<f64> {
     sizes.into_iter().find(|(one, _)| known && *one == unit).map(|(_, size)| size)
 }
 
-/// The question that a map's torque asks where it is another than its flux linkages make with so many pole pairs. Rows are currents and flux linkages along
-/// d and q, and the torque; no number where there is none.
+/// The question to ask if a map's torque differs from that of its flux linkages with this many pole pairs. Rows are currents and flux linkages along d and
+/// q, and the torque; not a number if there is none.
 pub fn question(
     rows: impl Iterator<Item = ([f64; 4], f64)>,
     pole_pairs: u32,
@@ -30,7 +30,7 @@ pub fn question(
         }
     }
     let ratio = told / made;
-    // Nor is it asked where there is no torque at all.
+    // The question is not asked either if there is no torque at all.
     if told == 0.0 || !ratio.is_finite() || (ratio - 1.0).abs() <= DIFFERENT {
         return None;
     }

@@ -17,10 +17,10 @@ pub struct Contents {
 
 const FILES: [&str; 2] = ["machine.toml", "flux_map.csv"];
 
-/// Writes a folder beside its place, has the table generator read it and the drive check its tables, and moves it there.
+/// Writes a folder beside its place, lets the table generator read it and the drive check its tables, and moves it there.
 ///
 /// # Errors
-/// Where the place is taken by anything but a machine folder, the generator or the drive refuses the contents, or it cannot be written.
+/// If the place is taken by anything but a machine folder, the generator or the drive refuses the contents, or it cannot be written.
 pub fn folder(out: &Path, contents: &Contents) -> Result<()> {
     let taken = check_place(out)?;
     let fill = |folder: &Path| {
@@ -28,7 +28,7 @@ pub fn folder(out: &Path, contents: &Contents) -> Result<()> {
             std::fs::write(folder.join(name), text)?;
         }
         let read = MachineFolder::read(folder).map_err(|error| {
-            // The file is never seen: its key and what is allowed are.
+            // The user never sees the file: its key and what is allowed matter.
             let file = error.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
             anyhow::anyhow!("the table generator refuses the {file} of these values: {}", error.problem)
         })?;
@@ -48,10 +48,10 @@ pub fn folder(out: &Path, contents: &Contents) -> Result<()> {
     written_folder(out, taken, fill)
 }
 
-/// The place is free, or an empty folder, or, which is `true`, a machine folder.
+/// Checks that the place is free, an empty folder, or, which gives `true`, a machine folder.
 ///
 /// # Errors
-/// Where anything else is there, or a file in its way.
+/// If anything else is there, or a file is in its way.
 pub fn check_place(out: &Path) -> Result<bool> {
     check_folder(out)?;
     if !out.exists() {
@@ -73,8 +73,8 @@ pub fn check_place(out: &Path) -> Result<bool> {
     Ok(!entries.is_empty())
 }
 
-/// `machine.toml` of a machine's name: a line for each key, its value and where that comes from, below the words that made it. A value
-/// that is not a number is left out.
+/// `machine.toml` for a machine's name: a line for each key, with its value and the value's origin, below the command that made it. A value that is
+/// not a number is left out.
 pub fn toml(name: &str, command: &str, lines: &[(&str, f64, &str)]) -> String {
     let mut text = format!(
         "# Made by: cargo rig {command}\n# Currents and voltages of phases are peak values.\nname = {name:?}\n\n"
@@ -86,7 +86,7 @@ pub fn toml(name: &str, command: &str, lines: &[(&str, f64, &str)]) -> String {
     text
 }
 
-/// `flux_map.csv` of a map with both signs of iq, after `#` comment lines; it holds those from 0 on.
+/// `flux_map.csv` of a map with both signs of iq, after `#` comment lines; the file holds iq from 0 on.
 pub fn csv(map: &FluxMap, comments: &str) -> String {
     let mut text = format!("{comments}id_a,iq_a,psi_d_wb,psi_q_wb\n");
     let columns = map.iq_a.len();
@@ -101,6 +101,6 @@ pub fn csv(map: &FluxMap, comments: &str) -> String {
 
 /// The nearest number with nine digits, so that it prints short.
 pub fn digits(value: f64) -> f64 {
-    // There is one zero.
+    // Adding zero turns −0 into 0.
     format!("{value:.8e}").parse::<f64>().unwrap_or(value) + 0.0
 }

@@ -1,8 +1,8 @@
-//! A carrier boundary, with all that has acted until then.
+//! A carrier boundary, with everything that has acted up to it.
 
 use tractive::identification::Stage;
 
-/// A boundary, and what has acted until then, stationary frame.
+/// A boundary, and everything that has acted up to it, stationary frame.
 pub struct Boundary {
     /// The part of the experiment.
     pub stage: Stage,
@@ -18,13 +18,13 @@ pub struct Boundary {
     pub lacking: [f64; 2],
     /// Volt-seconds that a threshold of one volt takes away, in s.
     pub opposed: [f64; 2],
-    /// Edges so far whose sign was not sure.
+    /// Edges so far whose current sign was uncertain.
     pub unsure: f64,
     /// Time so far, in s.
     pub passed_s: f64,
 }
 
-/// Turned from the rotor's frame to the stationary one.
+/// Transforms from the rotor's frame to the stationary one.
 pub fn turned((sin, cos): (f64, f64), [d, q]: [f64; 2]) -> [f64; 2] {
     [d * cos - q * sin, d * sin + q * cos]
 }

@@ -1,22 +1,23 @@
-//! The check of the map that the pulses at standstill have shown: flux linkages as the turning rotor's voltage shows them.
+//! The check of the map from the pulses at standstill: it is compared with the flux linkages from the turning rotor's voltage.
 //!
-//! Where the current stands still in the rotor's frame the volt-seconds are `∫u dt = ψ e^{jθ} + D ∫e^{jθ} dt + a constant`, with D for what
-//! resistance and inverter take beside what the fit says of both. Sped up and braked by currents along q of either sign, ψ_q and D_q change their signs, ψ_d and D_d do not, so that
-//! resistance, dead time and thresholds drop out as they do from the mean of a motor's voltage and a brake's at one speed. Coasting, ψ_q and D_q are none.
+//! While the current is constant in the rotor's frame the volt-seconds are `∫u dt = ψ e^{jθ} + D ∫e^{jθ} dt + a constant`. D is the voltage of resistance and
+//! inverter beyond the fit's values for both. When currents along q of either sign speed the rotor up and brake it, ψ_q and D_q change their signs, ψ_d and
+//! D_d do not. So resistance, dead time and thresholds drop out, as in the mean of a motoring and a braking voltage at one speed. When coasting, ψ_q and D_q
+//! are zero.
 
 use super::boundary::{Boundary, turned};
 use super::fit::{Fit, Turning};
 use nalgebra::{DMatrix, DVector};
 use tractive::identification::Stage;
 
-/// Currents along q that belong to a part of the turn, as shares of the largest one: within this of it.
+/// Distance of a current along q from that of its part of the turn, as a share of the largest one: at most this.
 const WITHIN: f64 = 0.25;
 /// Fewest boundaries of a part, and fewest electrical radians that the rotor turns in it.
 const LEAST: usize = 40;
 const LEAST_RAD: f64 = 3.0;
 
-/// A part of the turn in which the current stands still: sine and cosine of the d axis at each boundary, volt-seconds and `∫e^{jθ} dt` from the
-/// first on, and the mean of the current.
+/// A part of the turn in which the current is constant: sine and cosine of the d axis at each boundary, volt-seconds and `∫e^{jθ} dt` from the first
+/// one on, and the mean of the current.
 struct Part {
     frames: Vec<[f64; 2]>,
     volt_seconds: Vec<[f64; 2]>,
@@ -25,7 +26,7 @@ struct Part {
 }
 
 impl Part {
-    /// The longest row of boundaries whose current along q is this one, in A, within so much; `None` if the rotor turns too little in it.
+    /// The longest run of boundaries whose current along q is this one, in A, within a tolerance; `None` if the rotor turns too little in it.
     fn of(turn: &[&Boundary], fit: &Fit, iq_a: f64, within_a: f64) -> Option<Self> {
         let rows = turn.split(|boundary| (boundary.current.1 - iq_a).abs() > within_a);
         let row = rows.max_by_key(|row| row.len()).filter(|row| row.len() >= LEAST)?;
@@ -43,7 +44,7 @@ impl Part {
                 turned_rad += (sin * frame[0] - cos * frame[1]).asin();
             }
             before = Some((boundary, [cos, sin]));
-            // The current's own way about its mean is known well enough by the map.
+            // The map is accurate enough for the current's own deviations from its mean.
             let here = fit.flux_at_standstill(boundary.current.0, boundary.current.1);
             let more = turned(boundary.frame, [here.0 - middle.0, here.1 - middle.1]);
             let taken = fit.taken(boundary);
@@ -54,7 +55,7 @@ impl Part {
         (turned_rad.abs() > LEAST_RAD).then_some(part)
     }
 
-    /// Two rows of equations for each boundary: ψ_d, ψ_q, D_d, D_q, with those along q of this sign, and what they give; each from its mean.
+    /// Two rows of equations for each boundary: ψ_d, ψ_q, D_d, D_q, those along q with this sign, and the right side; each relative to its mean.
     fn rows(&self, sign: f64) -> Vec<[f64; 5]> {
         let mut rows = Vec::with_capacity(2 * self.frames.len());
         for axis in 0..2 {
@@ -74,7 +75,7 @@ impl Part {
     }
 }
 
-/// ψ_d and ψ_q of rows, by least squares; `along_q`: `false` where there is none of the latter.
+/// ψ_d and ψ_q from rows, by least squares; `along_q`: `false` if the latter is absent.
 fn solved(rows: &[[f64; 5]], along_q: bool) -> Option<(f64, f64)> {
     let columns: &[usize] = if along_q { &[0, 1, 2, 3] } else { &[0, 2] };
     let matrix = DMatrix::from_fn(rows.len(), columns.len(), |row, column| rows[row][columns[column]]);
@@ -84,12 +85,12 @@ fn solved(rows: &[[f64; 5]], along_q: bool) -> Option<(f64, f64)> {
     (own.0.is_finite() && own.1.is_finite()).then_some(own)
 }
 
-/// Flux linkages of the turning rotor: sped up and braked, and coasting. Those that the turn does not tell are left out.
+/// Flux linkages of the turning rotor: sped up and braked, and coasting. Those that the turn does not determine are left out.
 pub fn turning(boundaries: &[Boundary], fit: &Fit) -> Vec<Turning> {
     let turn: Vec<&Boundary> = boundaries.iter().filter(|b| b.stage == Stage::Turn).collect();
     let mut along_q: Vec<f64> = turn.iter().map(|b| b.current.1.abs()).collect();
     along_q.sort_by(f64::total_cmp);
-    // The rotor coasts for most of the turn; not the noise's largest.
+    // The rotor coasts for most of the turn; this avoids the largest noise.
     let most_a = along_q.get(19 * along_q.len() / 20).copied().unwrap_or(0.0);
     let within_a = WITHIN * most_a;
     let part = |share: f64| Part::of(&turn, fit, share * most_a, within_a);
@@ -129,7 +130,7 @@ impl Turning {
 mod tests {
     use super::*;
 
-    /// A part of the turn, with drops of voltage that nothing else tells; ψ_d, ψ_q and the drops along d and q change their signs with the current.
+    /// A part of the turn, with voltage drops that nothing else shows; ψ_d, ψ_q and the drops along d and q change their signs with the current.
     fn part(omega: [f64; 2], [psi_d, psi_q]: [f64; 2], [drop_d, drop_q]: [f64; 2]) -> Part {
         const LENGTH_S: f64 = 5e-4;
         let turned = |[d, q]: [f64; 2], theta: f64| turned(theta.sin_cos(), [d, q]);

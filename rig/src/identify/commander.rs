@@ -1,4 +1,4 @@
-//! The commander of an experiment over the protocol: charges the link, enables, waits for the end, and gathers what was observed.
+//! The commander of an experiment over the protocol: charges the link, enables, waits for the end, and collects the observations.
 
 use crate::bench::Wiring;
 use crate::run::{Supervisor, Turn, bar};
@@ -13,10 +13,10 @@ use tractive::protocol::{
     EXPERIMENT, ExperimentFrame, FROM_IDENTIFICATION, Frame, OBSERVATION, ObservationFrame, Payload,
 };
 
-/// The part of the commander's work.
+/// The current part of the commander's work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// At rest until the drive is ready: no level counts before.
+    /// At rest until the drive is ready: before that no level counts.
     Wait,
     Charge,
     /// Enabled until the experiment is over.
@@ -29,7 +29,7 @@ enum Phase {
 }
 
 impl Phase {
-    /// The longest time for it, in s, and what has not come by then.
+    /// The longest time for it, in s, and the name of what is missing after that.
     const fn most(self) -> (u64, &'static str) {
         match self {
             Self::Wait => (5, "the drive is not ready"),
@@ -42,18 +42,18 @@ impl Phase {
     }
 }
 
-/// A fault that has ended an experiment, as the drive tells it.
+/// A fault that has ended an experiment, as reported by the drive.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ended {
     /// Its name.
     pub fault: String,
-    /// The value, and the limit that it has passed.
+    /// The value that has passed the limit.
     pub value: String,
     /// The limit.
     pub limit: String,
-    /// The number that mends the angle's zero, electrical, in degrees, where the rotor has turned away and the pulses tell it.
+    /// The correction of the angle's zero, electrical, in degrees, if the rotor has turned away and the pulses determine it.
     pub zero_deg: Option<f64>,
-    /// The wires of the current sensors, where the currents do not follow the voltage and the first pulses tell them.
+    /// The wiring of the current sensors, if the currents do not follow the voltage and the first pulses determine it.
     pub wiring: Option<Wiring>,
 }
 
@@ -64,32 +64,32 @@ pub struct Commander {
     listener: Listener,
     units: Units,
     phase: Phase,
-    /// Slots so far, and when the phase began.
+    /// Slots so far, and the slot in which the phase began.
     slot: u64,
     since: u64,
-    /// The drive's newest word of the experiment.
+    /// The drive's newest report about the experiment.
     told: ExperimentFrame,
-    /// The experiment has been seen under way; and its frames since that say that it is over, with something observed: one that ends with its first pulses may
-    /// go by between two frames.
+    /// `true` once the experiment has been seen under way; and its number of frames since then that say it is over, with something observed: an experiment
+    /// that ends with its first pulses may pass between two frames.
     went: bool,
     over: u32,
     words: Vec<[Option<u32>; PACKED_WORDS]>,
     gathered: usize,
     ended: Option<Ended>,
     shown: ProgressBar,
-    /// Lines as candump logs them.
+    /// Lines in candump's log format.
     pub frames: String,
 }
 
-/// Frames of an experiment that is over: the first may be of one before.
+/// Number of frames of an experiment that is over: the first may belong to an earlier one.
 const OVER_FRAMES: u32 = 2;
 /// Slots in a second.
 const SLOTS_S: u64 = 1_000;
-/// Slots for which the fault's value and limit are still waited for.
+/// Slots to wait for the fault's value and limit.
 const FAULT_SLOTS: u64 = 250;
 
 impl Commander {
-    /// Before the first slot, of a drive of these ratings.
+    /// Before the first slot, for a drive of these ratings.
     pub fn new(ratings: &Ratings) -> Self {
         let scales = System::Pmasynrm.scales(ratings);
         Self {
@@ -159,7 +159,7 @@ impl Commander {
     fn advance(&mut self) -> Result<()> {
         let [state, fault, refusal] = ["state", "fault", "refusal"].map(|name| self.listener.value(name));
         let levels = &mut self.command.levels;
-        // A drive without contactors is charged by whoever switches its supply.
+        // A drive without contactors is charged by switching on its supply.
         let ready = state == "charged" || (state == "ready" && refusal == "no_contactors");
         match self.phase {
             Phase::Wait if state == "ready" && self.slot > 100 => self.enter(Phase::Charge),
@@ -221,7 +221,7 @@ impl Commander {
         self.shown.set_message(name);
     }
 
-    /// As candump logs: time, channel, identifier and bytes, T for what is sent to the drive, R for what it sends.
+    /// In candump's log format: time, channel, identifier and bytes, T for frames sent to the drive, R for frames from it.
     fn log(&mut self, t_s: f64, frame: &Frame, direction: char) {
         let bytes: String = frame.data.iter().map(|byte| format!("{byte:02X}")).collect();
         let _ = writeln!(self.frames, "({t_s:.6}) can0 {:03X}#{bytes} {direction}", frame.id);

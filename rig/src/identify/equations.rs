@@ -5,26 +5,26 @@ use super::fit::{BESIDE, Fit};
 use crate::coenergy::{Basis, Equations};
 use tractive::identification::Stage;
 
-/// Boundaries in a part that counts from its own mean.
+/// Boundaries in a part that is taken relative to its own mean.
 const PART: usize = 100;
-/// Edges of an unsure sign after which a part ends: what they may have left out is no longer carried on. More of the turn, whose parts tell the magnets
-/// by the turn that is in them: with 8 the worst of 100 experiments had 0.43 % of the magnets' flux linkage wrong, with 5 0.53 %, by the law of pulses before this one.
+/// Edges of uncertain sign after which a part ends: their possible error is no longer carried on. More for the turn, whose parts determine the magnets by the
+/// turn within them: with 8 the worst of 100 experiments had 0.43 % of the magnets' flux linkage wrong, with 5 0.53 %, by the law of pulses before this one.
 const UNSURE_EDGES: f64 = 1.5;
 const UNSURE_EDGES_TURNING: f64 = 8.0;
 /// Shortest part.
 const LEAST_PART: usize = 4;
 
-/// The boundaries that a solution is made of.
+/// The boundaries used for a solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// All with currents: pulses and turn.
     All,
-    /// Those at standstill alone.
+    /// Only those at standstill.
     Pulses,
 }
 
 impl Scope {
-    /// `true` if a stage's boundaries are used: not those at no current, where no edge's sign is sure.
+    /// `true` if a stage's boundaries are used: those at zero current are not, as no edge's sign is certain there.
     fn uses(self, stage: Stage) -> bool {
         match stage {
             Stage::Probe | Stage::Rest | Stage::Done => false,
@@ -34,7 +34,7 @@ impl Scope {
     }
 }
 
-/// The parts that count from their own mean.
+/// The parts that are taken relative to their own mean.
 fn parts(all: &[Boundary], scope: Scope) -> Vec<&[Boundary]> {
     let (mut parts, mut from) = (Vec::new(), 0);
     for (k, boundary) in all.iter().enumerate() {
@@ -52,7 +52,7 @@ fn parts(all: &[Boundary], scope: Scope) -> Vec<&[Boundary]> {
     parts
 }
 
-/// The two rows of each boundary, every part's from its mean. With a fit that is known the last unknown is a turn of the frame.
+/// The two rows of each boundary, relative to its part's mean. If a fit is known the last unknown is a rotation of the frame.
 pub fn equations(boundaries: &[Boundary], basis: &Basis, known: Option<&Fit>, scope: Scope) -> Equations {
     let unknowns = basis.len() + BESIDE + usize::from(known.is_some());
     let mut equations = Equations::new(unknowns);

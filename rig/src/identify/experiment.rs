@@ -1,8 +1,8 @@
 //! The fit of an experiment's observations: one set of linear equations, solved by least squares.
 //!
-//! In the stationary frame, from a boundary to any later one, `ψ(i) turned to the rotor's angle` changes by the volt-seconds that acted
-//! less `R ∫i dt` and the inverter's voltage error. All is linear in what is unknown: the terms of the co-energy, the resistance, the
-//! voltage error. What was before each part of the experiment is a constant of that part, and so each part counts from its mean.
+//! In the stationary frame, from a boundary to any later one, `ψ(i) turned to the rotor's angle` changes by the volt-seconds that acted minus
+//! `R ∫i dt` and the inverter's voltage error. All of this is linear in the unknowns: the terms of the co-energy, the resistance, the voltage error.
+//! The state before each part of the experiment is a constant of that part, so each part is taken relative to its mean.
 
 use super::boundary::{Boundary, turned};
 use super::check::turning;
@@ -14,24 +14,24 @@ use crate::coenergy::{Basis, Equations, Polynomial};
 use anyhow::{Result, ensure};
 use tractive::identification::Observation;
 
-/// Weight of the flux linkages' bends beside a sample's residual, in squares of the bound: how straight a machine is, as far as it is to tell resistance,
-/// inverter, zero and magnets apart. And weight of the change of the bends, in cubes of it, for the map itself: iron saturates further where no pulse has
-/// been. With 1.5e-5 of it, 3 of 100 maps fell in the corner that pulses show least, by an earlier law of the pulses.
+/// Weight of the flux linkages' bends relative to a sample's residual, in squares of the bound: how straight a machine is taken to be when resistance,
+/// inverter, zero and magnets are told apart. And weight of the change of the bends, in cubes of it, for the map itself: iron saturates further where no pulse
+/// has been. With 1.5e-5 for the latter, 3 of 100 maps fell in the corner that the pulses show least, by an earlier law of the pulses.
 const STRAIGHT: f64 = 4e-4;
 const ONWARD: f64 = 3.5e-5;
-/// Weight of what is known for sure beside a sample's residual.
+/// Weight of exactly known values relative to a sample's residual.
 const SURE: f64 = 1e3;
-/// Phase current, as a share of the bound, whose sign is not sure.
+/// Phase current, as a share of the bound, below which its sign is uncertain.
 const SMALL_SHARE: f64 = 0.015;
-/// Rounds in which ripple, inductances and the angle's zero find each other: at least, at most, and the change of the zero, in rad, below
-/// which they have.
+/// Rounds in which ripple, inductances and the angle's zero converge: at least, at most, and the change of the zero, in rad, below which they have
+/// converged.
 const LEAST_ROUNDS: u32 = 2;
 const MOST_ROUNDS: u32 = 10;
 const SAME_RAD: f64 = 2e-4;
 /// Largest change of the zero in a round, in rad.
 const MOST_RAD: f64 = 0.1;
 
-/// The observations' own side of the fit.
+/// The input of the fit: the observations.
 struct Experiment<'a> {
     observations: &'a [Observation],
     bound_a: f64,
@@ -55,7 +55,7 @@ impl Experiment<'_> {
             let (last, last_dq) = before.replace((here, current)).unwrap_or((here, current));
             let acted = [f64::from(observation.volt_seconds.alpha), f64::from(observation.volt_seconds.beta)];
             let length_s = f64::from(observation.length_s);
-            // Two halves of one command, where control sees every second boundary.
+            // Two halves with one command, if control sees every second boundary.
             let count = (length_s / self.half_s).round().max(1.0);
             let mean = (0.5 * (current.0 + last_dq.0), 0.5 * (current.1 + last_dq.1));
             let [first, second] = per_flux(mean).map(|row| turned(frame, row));
@@ -94,8 +94,8 @@ impl Experiment<'_> {
 }
 
 impl Experiment<'_> {
-    /// The fit: at first as if the current went straight from boundary to boundary, then with the ripple that its own inductances make, and
-    /// in the frame in which it explains most.
+    /// The fit: first as if the current went straight from boundary to boundary, then with the ripple from its own inductances, and in the frame in
+    /// which it explains most.
     fn fit(&self) -> Result<Fit> {
         let mut fit = self.solved(None)?;
         for round in 1..=MOST_ROUNDS {
@@ -109,7 +109,8 @@ impl Experiment<'_> {
         Ok(fit)
     }
 
-    /// That fit with what it does not need for itself: the map at standstill, the bends beyond the pulses, and the turning rotor's own flux linkages.
+    /// That fit with the results that it does not need for itself: the map at standstill, the bends beyond the pulses, and the turning rotor's own flux
+    /// linkages.
     fn completed(&self, mut fit: Fit) -> Result<Fit> {
         let boundaries = self.boundaries(Some(&fit));
         fit.still.terms = self.still(&boundaries, &fit)?;
@@ -155,8 +156,8 @@ impl Experiment<'_> {
         })
     }
 
-    /// The terms of a map whose bends change little: what is no part of the map, and the magnets' flux linkage, stay what they are in the fit of all,
-    /// whose straighter map tells them apart.
+    /// The terms of a map whose bends change little: everything outside the map, and the magnets' flux linkage, keep their values from the fit of all
+    /// observations, whose straighter map separates them.
     fn onward(&self, boundaries: &[Boundary], fit: &Fit) -> Result<Vec<f64>> {
         let beside = [fit.resistance_ohm, fit.dead_time_s, fit.threshold_v];
         let mut equations = equations(boundaries, &fit.coenergy.basis, None, Scope::All).given(&beside);
@@ -167,7 +168,7 @@ impl Experiment<'_> {
         Ok(equations.solve()?.unknowns)
     }
 
-    /// The terms that the pulses at standstill show: the magnets' flux linkage is no part of it, and stays what it is in the fit of all.
+    /// The terms that the pulses at standstill determine: the magnets' flux linkage is not one of them, and keeps its value from the fit of all observations.
     fn still(&self, boundaries: &[Boundary], fit: &Fit) -> Result<Vec<f64>> {
         let mut equations = self.equations(boundaries, &fit.coenergy.basis, Some(fit), Scope::Pulses);
         let [along_d, _] = fit.coenergy.basis.flux((0.0, 0.0));
@@ -181,9 +182,9 @@ impl Experiment<'_> {
 /// The fit of all observations, with the bound of the current in A and the length of a carrier half in s.
 ///
 /// # Errors
-/// Observations that do not tell the machine.
+/// If the observations do not determine the machine.
 pub fn fit(observations: &[Observation], bound_a: f64, half_s: f64) -> Result<Fit> {
-    // The kind of the first half is not told: the one that explains more is it.
+    // The kind of the first half is not reported: it is the one that explains more.
     let of_kind = |falls| Experiment { observations, bound_a, half_s, falls };
     let (rising, falling) = (of_kind(true), of_kind(false));
     let (of_rising, of_falling) = (rising.fit()?, falling.fit()?);

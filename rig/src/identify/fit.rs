@@ -1,4 +1,4 @@
-//! A machine as an experiment's observations show it.
+//! A machine as determined from an experiment's observations.
 
 use super::boundary::Boundary;
 use super::half::add;
@@ -6,12 +6,12 @@ use crate::coenergy::{Polynomial, Spread};
 use tractive::identification::Stage;
 use tractive_tablegen::FluxMap;
 
-/// Unknowns beside the co-energy's terms: resistance, dead time, threshold.
+/// Number of unknowns in addition to the co-energy's terms: resistance, dead time, threshold.
 pub const BESIDE: usize = 3;
-/// Current over the bound up to which the polynomial is the map: what has no sample near it, and where no ripple goes, goes on straight.
+/// Current over the bound up to which the polynomial is the map: beyond it, where there are no samples and no ripple reaches, the map continues straight.
 const KNOWN_SHARE: f64 = 1.1;
 
-/// A flux linkage at a current, as the turning rotor shows it, and as the pulses do.
+/// A flux linkage at a current, from the turning rotor and from the pulses.
 #[derive(Clone, Copy, Debug)]
 pub struct Turning {
     /// Current along d and q, in A.
@@ -22,42 +22,42 @@ pub struct Turning {
     pub map: (f64, f64),
 }
 
-/// A machine as the observations show it.
+/// A machine as determined from the observations.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The co-energy.
     pub(super) coenergy: Polynomial,
     /// Stator resistance, in ohm.
     pub resistance_ohm: f64,
-    /// The dead time, in s: what the inverter's voltage lacks at the edges of its pulses.
+    /// The dead time, in s: the inverter's missing voltage at the edges of its pulses.
     pub dead_time_s: f64,
-    /// The devices' threshold, in V: what it lacks meanwhile, against each phase's current. Its slope is part of the resistance.
+    /// The devices' threshold, in V: the missing voltage between the edges, against each phase's current. Its slope is part of the resistance.
     pub threshold_v: f64,
-    /// The angle by which the d axis lies ahead of where the observations say that it is, electrical, in rad.
+    /// The electrical angle by which the d axis lies ahead of its position in the observations, in rad.
     pub zero_rad: f64,
     /// The unexplained part of each boundary's flux linkage, by its stage, in Wb: along d and along q.
     pub residuals: Vec<(Stage, [f64; 2])>,
-    /// The co-energy as the pulses at standstill alone show it, but for the magnets' flux linkage, which is this fit's.
+    /// The co-energy from the pulses at standstill alone, except for the magnets' flux linkage, which is this fit's.
     pub(super) still: Polynomial,
-    /// Flux linkages of the turning rotor beside those.
+    /// Flux linkages of the turning rotor compared with those.
     pub turning: Vec<Turning>,
     pub(super) spread: Spread,
 }
 
 impl Fit {
-    /// Root mean square of what is left, in Wb.
+    /// Root mean square of the residuals, in Wb.
     pub fn left_wb(&self) -> f64 {
         let sum: f64 = self.residuals.iter().map(|(_, [d, q])| d * d + q * q).sum();
         (sum / self.residuals.len() as f64).sqrt()
     }
 
-    /// The flux linkage in the observations' frame, in Wb, by which a frame that is turned by one rad makes it another.
+    /// The change of the flux linkage in the observations' frame, in Wb, when the frame is rotated by one rad.
     pub fn turns(&self, (id, iq): (f64, f64)) -> [f64; 2] {
         let ((psi_d, psi_q), [dd, dq, qq]) = (self.flux(id, iq), self.coenergy.inductances((id, iq)));
         [dd * iq - dq * id - psi_q, psi_d + dq * iq - qq * id]
     }
 
-    /// Current, in A, of a small flux linkage, in Wb, at a current: the inverse of the incremental inductance.
+    /// Current, in A, per small flux linkage, in Wb, at a current: the inverse of the incremental inductance.
     pub(super) fn per_flux(&self, current: (f64, f64)) -> [[f64; 2]; 2] {
         let [dd, dq, qq] = self.coenergy.inductances(current);
         let determinant = dd * qq - dq * dq;
@@ -67,7 +67,7 @@ impl Fit {
         [[qq / determinant, -dq / determinant], [-dq / determinant, dd / determinant]]
     }
 
-    /// Volt-seconds that resistance and inverter have taken until a boundary, in V·s.
+    /// Volt-seconds taken by resistance and inverter up to a boundary, in V·s.
     pub fn taken(&self, boundary: &Boundary) -> [f64; 2] {
         let charge = boundary.charge.map(|charge| self.resistance_ohm * charge);
         add(add(charge, boundary.lacking, self.dead_time_s), boundary.opposed, self.threshold_v)
@@ -78,7 +78,7 @@ impl Fit {
         self.coenergy.flux((id_a, iq_a))
     }
 
-    /// The same as the pulses at standstill alone show them, with this fit's magnets.
+    /// The same from the pulses at standstill alone, with this fit's magnets.
     pub fn flux_at_standstill(&self, id_a: f64, iq_a: f64) -> (f64, f64) {
         self.still.flux((id_a, iq_a))
     }
@@ -98,7 +98,7 @@ impl Fit {
         })
     }
 
-    /// The voltage that the inverter lacks in all, in V, of a leg with this link in V and this length of a carrier half in s: dead time and threshold
+    /// The inverter's total missing voltage, in V, of a leg with this link in V and this length of a carrier half in s: dead time and threshold
     /// together, and the standard error of the sum.
     pub fn lacking_v(&self, udc_v: f64, half_s: f64) -> (f64, f64) {
         let per_s = 0.5 * udc_v / half_s;
@@ -107,7 +107,7 @@ impl Fit {
         (per_s * self.dead_time_s + self.threshold_v, self.spread.error(&shares))
     }
 
-    /// The map on a grid that the table generator takes: up to the bound and a little more, along +d a fifth of it.
+    /// The map on a grid that the table generator accepts: up to the bound and a little more, along +d a fifth of it.
     pub fn map(&self, bound_a: f64) -> FluxMap {
         const STEPS: i32 = 25;
         let current_a = |step: i32| crate::folder::digits(bound_a * f64::from(step) / f64::from(STEPS));

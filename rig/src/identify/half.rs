@@ -1,8 +1,8 @@
-//! A carrier half from within: the currents at the legs' edges, which decide on the inverter's voltage error.
+//! The inside of a carrier half: the currents at the legs' edges, which decide on the inverter's voltage error.
 //!
-//! From the volt-seconds of a half follow its pulses, as the free carrier makes them: each leg has one edge, and the zero vectors lie evenly
-//! at both ends. The flux linkage along the way and the incremental inductance give the current at each edge. A falling edge comes late
-//! by the dead time where the leg's current is negative, a rising one where it is positive.
+//! The volt-seconds of a half determine its pulses, as the free carrier makes them: each leg has one edge, and the zero vectors are divided equally
+//! between both ends. The flux linkage along the way and the incremental inductance give the current at each edge. A falling edge is late by the dead
+//! time if the leg's current is negative, a rising one if it is positive.
 
 use core::f64::consts::FRAC_PI_3;
 
@@ -16,7 +16,7 @@ pub struct Half {
     pub length_s: f64,
     /// DC-link voltage, in V.
     pub udc_v: f64,
-    /// Current, in A, of a small flux linkage, in Wb; nothing while that is not known.
+    /// Current, in A, per small flux linkage, in Wb; zero while that is not known.
     pub per_flux: [[f64; 2]; 2],
     /// `true` if it begins with the upper devices on: its edges fall.
     pub falls: bool,
@@ -31,7 +31,7 @@ pub struct Inside {
     pub lacking: [f64; 2],
     /// Volt-seconds that a threshold of one volt would take away, in s.
     pub opposed: [f64; 2],
-    /// Edges whose sign is not sure, each in proportion.
+    /// Edges whose sign is uncertain, each in proportion.
     pub unsure: f64,
 }
 
@@ -50,7 +50,7 @@ pub fn add(a: [f64; 2], b: [f64; 2], scale: f64) -> [f64; 2] {
     [a[0] + scale * b[0], a[1] + scale * b[1]]
 }
 
-/// Mean of a current's sign on its way from one to another, in A: in proportion below `small_a`.
+/// Mean of a current's sign on its way from one value to another, in A: proportional below `small_a`.
 fn mean_sign([from, to]: [f64; 2], small_a: f64) -> f64 {
     // The integral of the sign.
     let integral = |a: f64| if a.abs() < small_a { 0.5 * a * a / small_a } else { a.abs() - 0.5 * small_a };
@@ -74,7 +74,7 @@ impl Half {
         })
     }
 
-    /// Current that a flux linkage goes with, in A.
+    /// Current that belongs to a flux linkage, in A.
     fn current(&self, flux: [f64; 2]) -> [f64; 2] {
         self.per_flux.map(|row| dot(row, flux))
     }
@@ -85,7 +85,7 @@ impl Half {
         let edges = self.edges_s();
         let mut order = [0, 1, 2];
         order.sort_by(|a, b| edges[*a].total_cmp(&edges[*b]));
-        // What both ends leave unexplained comes evenly.
+        // The part that both ends leave unexplained is spread evenly.
         let drift = add(add(end, start, -1.0), self.current(self.acted), -1.0);
         let mut found = Inside::default();
         let (mut at_s, mut flux, mut before, mut voltage) = (0.0, [0.0; 2], start, [0.0; 2]);
@@ -110,7 +110,7 @@ impl Half {
 }
 
 impl Inside {
-    /// Takes a time in which no leg has an edge, with the current at both of its ends.
+    /// Adds a time in which no leg has an edge, with the current at both of its ends.
     fn passed(&mut self, [from, to]: [[f64; 2]; 2], passed_s: f64, small_a: f64) {
         self.charge = add(add(self.charge, from, 0.5 * passed_s), to, 0.5 * passed_s);
         for phase in 0..3 {
@@ -148,7 +148,7 @@ mod tests {
 
     #[test]
     fn a_current_of_each_sign_lacks_half_a_dead_time_from_its_mean() {
-        // Phase a is positive, b and c are negative, in both kinds of half: −½ (1, −1, −1) and what is common, which is nothing.
+        // Phase a is positive, b and c are negative, in both kinds of half: −½ (1, −1, −1) plus the common part, which is zero.
         for falls in [true, false] {
             let lacking = Half { falls, ..HALF }.inside(0.1).lacking;
             assert!(
@@ -162,7 +162,7 @@ mod tests {
     fn a_threshold_acts_over_the_whole_half_against_each_current() {
         let opposed = HALF.inside(0.1).opposed;
         assert!((opposed[0] - 4.0 / 3.0 * 5e-4).abs() < 1e-9 && opposed[1].abs() < 1e-9, "{opposed:?}");
-        // A current that comes from one side of zero and goes as far to the other has no sign on average.
+        // A current that comes from one side of zero and goes equally far to the other has no sign on average.
         assert!(
             mean_sign([-5.0, 5.0], 0.1).abs() < 1e-12 && (mean_sign([-5.0, 15.0], 0.1) - 0.5).abs() < 1e-2
         );

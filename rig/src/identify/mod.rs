@@ -1,7 +1,7 @@
 //! `cargo rig identify`: an unknown machine identified by its own drive.
 //!
-//! The drive's own tasks run [`tractive::identification`] against a simulated machine; [`Fit`] makes a flux map, a resistance and a dead time of
-//! what they observe. What is known beforehand is what a nameplate tells: the keys of `machine.toml` but for resistance and inertia.
+//! The drive's own tasks run [`tractive::identification`] against a simulated machine; [`Fit`] makes a flux map, a resistance and a dead time from
+//! their observations. Known beforehand is only what a nameplate says: the keys of `machine.toml` except resistance and inertia.
 
 mod boundary;
 mod check;
@@ -50,13 +50,13 @@ pub struct Identify {
     /// Inertia of the free rotor, in kg·m²; default the folder's.
     #[arg(long, value_name = "KG_M2", value_parser = positive, allow_negative_numbers = true)]
     pub inertia: Option<f64>,
-    /// From this time on a current sensor reads too much, in s: the fault ends the experiment.
+    /// Time from which on a current sensor reads too much, in s: the fault ends the experiment.
     #[arg(long, value_name = "SECONDS", value_parser = not_negative, allow_negative_numbers = true)]
     pub fault_at: Option<f64>,
-    /// Command the drive over the protocol, as a board is: charge, enable, stop, and gather what it has kept, frame by frame.
+    /// Command the drive over the protocol, like a board: charge, enable, stop, and collect its observations, frame by frame.
     #[arg(long)]
     pub over_protocol: bool,
-    /// With --over-protocol: a file for the frames, as candump logs them.
+    /// With --over-protocol: a file for the frames, in candump's log format.
     #[arg(long, value_name = "FILE", requires = "over_protocol")]
     pub frames: Option<PathBuf>,
     /// Identify the machine of a board on this CAN interface, for instance can0; on Linux.
@@ -67,10 +67,10 @@ pub struct Identify {
     pub page: Option<PathBuf>,
 }
 
-/// Does what the command says. Exit code 1 where a fault has ended the experiment; then nothing is written.
+/// Executes the command. Exit code 1 if a fault has ended the experiment; then nothing is written.
 ///
 /// # Errors
-/// Options that make no sense, observations that do not tell the machine, a folder that the table generator refuses.
+/// Options that make no sense, observations that do not determine the machine, or a folder that the table generator refuses.
 pub fn command(identify: &Identify) -> Result<ExitCode> {
     let Some(out) = &identify.options.out else {
         bail!("--out: must name the machine folder to make");
@@ -96,7 +96,7 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Remedy of an experiment that has ended with a fault, in words behind others.
+/// Remedy for an experiment that has ended with a fault, as words that follow others.
 fn remedy(fault: &str) -> &'static str {
     match fault {
         ROTOR_TURNED => {
@@ -106,7 +106,7 @@ fn remedy(fault: &str) -> &'static str {
     }
 }
 
-/// Least share of the largest current that pulses against the magnets' flux must be allowed: with less a rotor turns away.
+/// Least share of the largest current that must be allowed for pulses against the magnets' flux: with less a rotor turns away.
 const LEAST_ID_SHARE: f64 = 0.1;
 
 /// The outcome of an experiment, or the fault that has ended it.
@@ -162,8 +162,8 @@ pub const ROTOR_TURNED: &str = "rotor_turned";
 /// The fault of an experiment whose currents do not follow the voltage.
 pub const CURRENT_SENSORS: &str = "current_sensors";
 
-/// Observations of an experiment that has come to its end. One whose rotor is not where it should be, as its angle is wrong or a load turns
-/// it, ends before the rotor is to turn; one whose currents answer as no machine's do, after its first pulses.
+/// Observations of an experiment that has run to its end. If its rotor is in the wrong place, because its angle is wrong or a load turns it, it ends
+/// before the rotor is to turn; if its currents respond as no machine's do, it ends after its first pulses.
 fn complete(observations: Vec<Observation>, bound_a: f64) -> std::result::Result<Vec<Observation>, Ended> {
     let reached = |stage: Stage| observations.iter().any(|observation| observation.stage == stage);
     if reached(Stage::Turn) {
@@ -181,7 +181,7 @@ fn complete(observations: Vec<Observation>, bound_a: f64) -> std::result::Result
     })
 }
 
-/// The same of a drive on a CAN bus, whose truth nobody knows.
+/// The same for a drive on a CAN bus, whose true parameters nobody knows.
 fn on_bus(interface: &str, machine: &Machine) -> Result<std::result::Result<Outcome, Ended>> {
     let mut commander = Commander::new(&machine.tables.ratings);
     can::command(interface, &mut commander)?;
@@ -212,7 +212,7 @@ pub fn contents(outcome: &Outcome, machine: &Machine) -> Contents {
     Contents { toml: toml::of(outcome, &map, parameters), map: csv(&map, &about) }
 }
 
-/// The page: map, residuals, and how far it is from the truth, which only a simulation knows.
+/// The page: map, residuals, and the errors against the truth, which only a simulation knows.
 fn write_page(outcome: &Outcome, machine: &Machine, path: &std::path::Path) -> Result<()> {
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).with_context(|| format!("--page {}", path.display()))?;

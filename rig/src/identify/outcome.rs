@@ -1,4 +1,4 @@
-//! The outcome of an experiment, and how far it is from the truth.
+//! The outcome of an experiment, and its errors against the truth.
 
 use super::corrected::{offset_a, turned_by, without_offset};
 use super::experiment;
@@ -27,14 +27,14 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// Of the options.
+    /// Made from the options.
     ///
     /// # Errors
-    /// A folder that cannot be read.
+    /// If a folder cannot be read.
     pub fn of(options: &Options, machine: &Machine, inertia_kg_m2: f64) -> Result<Self> {
         let truth = options.own.plant.as_deref().map_or_else(|| Ok(machine.clone()), Machine::load)?;
         let (parameters, plant) = (&truth.folder.parameters, options.plant());
-        // Whichever conducts, half of the time each.
+        // Averages over the conducting device: each half of the time.
         let drops = options.own.flaws.drops();
         let slope_ohm = 0.5 * (drops.igbt_ohm + drops.diode_ohm);
         let map = SmoothMap::new(&truth.folder.map);
@@ -69,11 +69,12 @@ pub struct Outcome {
     pub fit: Fit,
     /// Inertia and friction.
     pub rotor: Rotor,
-    /// The largest reading of a phase's sensor where no current flows, as far as the phases' sum does not take part, in A.
+    /// The largest reading of a phase's sensor at zero current, without the part common to all phases, in A.
     pub offset_a: f64,
-    /// The inverter's voltage error of a leg at the link's mean, dead time and threshold together, in V, and its standard error.
+    /// The inverter's voltage error of a leg at the mean link voltage, dead time and threshold together, in V, and its standard error.
     pub lacking_v: (f64, f64),
-    /// The largest flux linkage of the turning rotor off that of the pulses' map, over the map's largest flux linkage; and likewise of the torque, over the machine's largest.
+    /// The largest deviation of the turning rotor's flux linkage from that of the pulses' map, over the map's largest flux linkage; and likewise of the
+    /// torque, over the machine's largest.
     pub turning_flux_off: f64,
     /// The latter.
     pub turning_torque_off: f64,
@@ -85,7 +86,7 @@ pub struct Outcome {
     pub peak_a: f64,
     /// The largest mechanical turn from the beginning until the rotor is to turn, in degrees.
     pub turned_deg: f64,
-    /// Error of the flux linkage, root mean square, as a share of the largest within the circle that is judged.
+    /// Root-mean-square error of the flux linkage, as a share of the largest within the circle that is judged.
     pub flux_rms: f64,
     /// The worst error, likewise.
     pub flux_worst: f64,
@@ -104,10 +105,10 @@ pub struct Outcome {
 const JUDGED: f64 = 0.857;
 
 impl Outcome {
-    /// Of observations, with the largest current, in A; errors are told where the truth is known.
+    /// Made from observations, with the largest current, in A; errors are given if the truth is known.
     ///
     /// # Errors
-    /// Observations that do not tell the machine.
+    /// If the observations do not determine the machine.
     pub fn of(
         observations: &[Observation],
         peak_a: f64,
@@ -186,7 +187,7 @@ impl Outcome {
             ("stator_resistance_error_percent", percent(self.resistance_error)),
             ("rotor_inertia_error_percent", percent(self.inertia_error)),
         ];
-        // Without a truth no error is known, and without magnets no share of their flux.
+        // Without the truth no error is known, and without magnets there is no share of their flux.
         values
             .iter()
             .filter(|(_, value)| value.is_finite())
@@ -194,7 +195,7 @@ impl Outcome {
         figures
     }
 
-    /// Draws the map beside the truth, and what is left of each boundary.
+    /// Draws the map next to the truth, and the residual of each boundary.
     pub fn draw(&self, machine: &Machine, page: &mut Page) {
         let most = machine.folder.parameters.max_current_a;
         let along = |from: f64, to: f64| (0..=80).map(move |k| from + (to - from) * f64::from(k) / 80.0);
@@ -220,7 +221,7 @@ impl Outcome {
 }
 
 impl Outcome {
-    /// Draws what to trust: standard errors of the map, and where the turning rotor's flux linkages lie beside it.
+    /// Draws the reliability: standard errors of the map, and the turning rotor's flux linkages next to it.
     fn draw_trust(&self, most: f64, page: &mut Page) {
         let along = |from: f64, to: f64| (0..=80).map(move |k| from + (to - from) * f64::from(k) / 80.0);
         let errors = |at: &dyn Fn(f64) -> (f64, f64)| -> Vec<(f64, f64)> {
@@ -284,7 +285,7 @@ fn flux_errors(fit: &Fit, truth: &Truth, machine: &Machine) -> (f64, f64) {
     ((sum / count).sqrt() / most, worst / most)
 }
 
-/// Error of the magnets' flux linkage, as a share; not a number where there is none but the map's rounding.
+/// Error of the magnets' flux linkage, as a share; not a number if there is only the map's rounding.
 fn magnet_error(fit: &Fit, truth: &Truth, machine: &Machine) -> f64 {
     let (magnets, most) =
         (truth.flux(0.0, 0.0).0, truth.flux(0.0, machine.folder.parameters.max_current_a).1);

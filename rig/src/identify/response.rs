@@ -1,7 +1,7 @@
 //! The response of the currents to the first pulses: the order and the signs of the current sensors.
 //!
-//! A machine's current answers volt-seconds by the inverse of its inductance, which is symmetric and has positive eigenvalues, wherever the rotor
-//! stands. Of sensors in another order or of another sign what answers is no such matrix; the wires with which it would be one are those.
+//! A machine's current responds to volt-seconds by the inverse of its inductance, which is symmetric and has positive eigenvalues at any rotor
+//! position. With sensors in another order or with another sign the response is no such matrix; the true wiring is the one with which it would be.
 
 use crate::bench::Wiring;
 use tractive::identification::{Observation, Stage};
@@ -9,14 +9,14 @@ use tractive::identification::{Observation, Stage};
 /// A matrix by its rows.
 type Matrix = [[f64; 2]; 2];
 
-/// Largest asymmetry, as a share of the trace, and largest ratio of the eigenvalues of what may be a machine.
+/// Limits for a matrix that may be a machine's: largest asymmetry, as a share of the trace, and largest ratio of the eigenvalues.
 const ASYMMETRY: f64 = 0.5;
 const RATIO: f64 = 100.0;
-/// The halves that are looked at.
+/// Number of halves that are used.
 const LAST: usize = 20;
 
-/// The wires of the current sensors with which the response to the probe's pulses is a machine's, of those in which the sensors have one sign. `None`
-/// where none is, or there are no pulses.
+/// The wiring of the current sensors with which the response to the probe's pulses is a machine's, among those in which the sensors have the same
+/// sign. `None` if there is none, or if there are no pulses.
 pub fn wiring(observations: &[Observation]) -> Option<Wiring> {
     let answers = response(observations)?;
     let explains =
@@ -26,7 +26,7 @@ pub fn wiring(observations: &[Observation]) -> Option<Wiring> {
 
 fn is_machine([[xx, xy], [yx, yy]]: Matrix) -> bool {
     let (trace, determinant) = (xx + yy, xx * yy - xy * yx);
-    // Of eigenvalues 1 and k: (1 + k)² / k.
+    // For eigenvalues 1 and k: (1 + k)² / k.
     let spread = trace * trace / determinant;
     trace > 0.0
         && determinant > 0.0
@@ -43,7 +43,7 @@ fn inverse([[a, b], [c, d]]: Matrix) -> Option<Matrix> {
     (determinant.abs() > 1e-9).then(|| [[d, -b], [-c, a]].map(|row| row.map(|value| value / determinant)))
 }
 
-/// Change of current of a volt-second, stationary frame, by least squares over the probe's last halves, in which pulses lie along both axes.
+/// Change of current per volt-second, stationary frame, by least squares over the probe's last halves, in which pulses lie along both axes.
 fn response(observations: &[Observation]) -> Option<Matrix> {
     let (mut squares, mut sides) = ([[0.0; 2]; 2], [[0.0; 2]; 2]);
     let probe = observations.iter().filter(|of| of.stage == Stage::Probe).count();

@@ -1,17 +1,17 @@
-//! Signs of sensors and the angle's zero and direction, as an experiment's observations tell them.
+//! Signs of sensors and the angle's zero and direction, as determined from an experiment's observations.
 
 use super::fit::Fit;
 use core::f64::consts::PI;
 use tractive::identification::{Observation, Stage};
 
-/// Angles that are near zero where everything is connected as it is said to be.
+/// Angles that are near zero if everything is connected as stated.
 #[derive(Clone, Copy, Debug)]
 pub struct Signs {
-    /// From the volt-seconds to the change of current that they make in the pulses along d, stationary frame, in degrees: 180 of currents
-    /// that are read with the wrong sign, and far from 0 where phases are exchanged.
+    /// Angle from the volt-seconds to the resulting change of current in the pulses along d, stationary frame, in degrees: 180 for currents read with
+    /// the wrong sign, and far from 0 if phases are swapped.
     pub response_deg: f64,
-    /// From where the angle says that the d axis is to where it is, electrical, in degrees: the error of the angle's zero, as the fit has found
-    /// it; near 180 where the magnets lie the other way round.
+    /// Angle from the stated d axis to the true one, electrical, in degrees: the error of the angle's zero, as found by the fit; near 180 if the
+    /// magnets are reversed.
     pub zero_deg: f64,
 }
 
@@ -35,11 +35,11 @@ fn direction(of: &Observation) -> Vector {
     (of.frame.cos.into(), of.frame.sin.into())
 }
 
-/// Flux linkage along −d without current, as a share of that of the largest current along q, that tells magnets the other way round.
+/// Flux linkage along −d without current, as a share of that of the largest current along q, beyond which the magnets are taken as reversed.
 const NEGATIVE_SHARE: f64 = 0.02;
 
 impl Signs {
-    /// Of the observations, turned to the d axis that the fit has found, with the machine that it has found and its largest current, in A.
+    /// Made from the observations, turned to the d axis of the fit, with the fit's machine and its largest current, in A.
     pub fn of(observations: &[Observation], fit: &Fit, bound_a: f64) -> Self {
         let mut response = (0.0, 0.0);
         for pair in observations.windows(2) {
@@ -53,7 +53,7 @@ impl Signs {
             let change = times((to.0 - from.0, to.1 - from.1), conjugate(volt_seconds));
             response = (response.0 + change.0, response.1 + change.1);
         }
-        // The pulses tell an axis; which way the magnets lie on it the map does.
+        // The pulses determine an axis; the map determines the direction of the magnets on it.
         let half_a_turn_off = fit.flux(0.0, 0.0).0 < -NEGATIVE_SHARE * fit.flux(0.0, bound_a).1;
         let zero_deg = fit.zero_rad.to_degrees();
         Self {
@@ -63,15 +63,15 @@ impl Signs {
     }
 }
 
-/// Halves along either axis from which the saliency is told, at least; largest current of one, as a share of the bound; and the least ratio of
+/// Fewest halves along either axis from which the saliency is determined; largest current of one, as a share of the bound; and the least ratio of
 /// both inductances.
 const LEAST_HALVES: usize = 10;
 const SMALL_SHARE: f64 = 0.4;
 const LEAST_RATIO: f64 = 1.05;
 
-/// The angle by which the axis of the lower inductance lies ahead of where the angle says that d is, electrical, in degrees from −90 to 90, as
-/// the pulses along d and along q show it at small currents: they need no rotor that turns. Without pulses along q a part of the angle, the greater, the
-/// more salient the machine is. `None` where there are too few pulses, or no saliency.
+/// The electrical angle by which the axis of the lower inductance lies ahead of the stated d axis, in degrees from −90 to 90, from the pulses along d
+/// and along q at small currents: they need no turning rotor. Without pulses along q the result is part of the angle, a larger part the more salient the
+/// machine is. `None` if there are too few pulses, or no saliency.
 pub fn saliency_deg(observations: &[Observation], bound_a: f64) -> Option<f64> {
     // Least squares of change = Y · volt-seconds: sums of the right sides and of the volt-seconds' squares.
     let (mut halves, mut sides, mut squares) = ([0_usize; 2], [[0.0; 2]; 2], [[0.0; 2]; 2]);

@@ -1,11 +1,11 @@
-//! `machine.toml` of an identified machine: the nameplate's keys, and what was found.
+//! `machine.toml` of an identified machine: the nameplate's keys, and the results.
 
 use super::Outcome;
 use crate::folder::{digits, toml};
 use core::f64::consts::TAU;
 use tractive_tablegen::{FluxMap, Optimum, Parameters, Patterns, SmoothMap};
 
-/// The text. The largest torque is the nameplate's, or what the map gives within the largest current, whichever is less; so is the largest power.
+/// The text. The largest torque is the nameplate's, or the map's within the largest current, whichever is less; likewise the largest power.
 pub fn of(outcome: &Outcome, map: &FluxMap, given: &Parameters) -> String {
     let smooth = SmoothMap::new(map);
     let reach_nm = Optimum::of(&smooth, given.pole_pairs, given.max_current_a).most_torque_nm();

@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 use nalgebra::{Matrix3, Vector3};
 use tractive::identification::{Observation, Stage};
 
-/// The rotor as it turns under a torque that is known.
+/// The mechanics of the rotor turning under a known torque.
 #[derive(Clone, Copy, Debug)]
 pub struct Rotor {
     /// Inertia, in kg·m².
@@ -21,7 +21,7 @@ pub fn turned_deg(observations: &[Observation], pole_pairs: f64) -> f64 {
     angles.iter().fold(0.0_f64, |most, angle| most.max(angle.abs())) / pole_pairs * 360.0 / TAU
 }
 
-/// Electrical angle since the first boundary, in rad, however often it goes round.
+/// Electrical angle since the first boundary, in rad, not wrapped.
 fn turns(observations: &[Observation]) -> Vec<f64> {
     let mut sum = 0.0;
     let mut angles = vec![0.0; usize::from(!observations.is_empty())];
@@ -34,8 +34,8 @@ fn turns(observations: &[Observation]) -> Vec<f64> {
 }
 
 impl Rotor {
-    /// Of the observations with the machine that was found of them: where the rotor is sped up, coasts and is braked, the torque's impulse is
-    /// `J ω`, friction times the time for which it has acted, and a constant. By least squares.
+    /// Made from the observations and the machine found from them: while the rotor is sped up, coasts and is braked, the torque's impulse is `J ω`,
+    /// plus friction times the time for which it has acted, plus a constant. By least squares.
     pub fn of(observations: &[Observation], fit: &Fit, pole_pairs: f64) -> Self {
         let own: Vec<_> = observations.iter().filter(|o| o.stage == Stage::Turn).copied().collect();
         let angles = turns(&own);
@@ -49,7 +49,7 @@ impl Rotor {
         for k in 1..own.len() {
             let length_s = f64::from(own[k].length_s);
             let mean_nm = 0.5 * (torque_nm(&own[k]) + torque_nm(&own[k - 1]));
-            // The mean speed of a half stands in its middle.
+            // The mean speed of a half applies at its middle.
             let speed = (angles[k] - angles[k - 1]) / length_s / pole_pairs;
             let own_s = if speed == 0.0 { 0.0 } else { speed.signum() * length_s };
             let row = Vector3::new(speed, acted_s + 0.5 * own_s, 1.0);

@@ -1,13 +1,12 @@
 //! The DC link: a capacitor between source, resistors and inverter.
 //!
-//! `C du/dt = i_source − u/R_discharge − u/R_chopper − i_inverter`, with `i_source = (U − u)/R` through whatever contactor is
-//! closed, or, where there is a choke, `L di_source/dt = U − u − R i_source` through the main one; a rectifier gives current only, a
-//! reversible source takes it too.
+//! `C du/dt = i_source − u/R_discharge − u/R_chopper − i_inverter`, with `i_source = (U − u)/R` through the closed contactor or, if there is a choke,
+//! `L di_source/dt = U − u − R i_source` through the main one; a rectifier only gives current, a reversible source also takes it back.
 
 use super::LineFilter;
 use super::runge_kutta::stepped;
 
-/// Step of Runge–Kutta, as a share of a line filter's shortest time constant: stable up to 2.7.
+/// Runge–Kutta step, as a share of a line filter's shortest time constant: stable up to 2.7.
 const CHOKED_SHARE: f64 = 0.4;
 
 /// The source of the link's energy.
@@ -21,7 +20,7 @@ pub struct Source {
     pub inductance_h: f64,
     /// `true` if it takes energy back; a rectifier does not.
     pub reversible: bool,
-    /// `true` if it is there; in a gap of the line it is not.
+    /// `true` if the source is present; during a gap of the line it is not.
     pub live: bool,
 }
 
@@ -36,7 +35,7 @@ pub struct DcLinkSettings {
     pub precharge_ohm: f64,
     /// Discharge resistor, in ohm.
     pub discharge_ohm: f64,
-    /// Resistance, in ohm, that auxiliaries and losses are to the link.
+    /// Resistance, in ohm, that represents auxiliaries and losses on the link.
     pub auxiliary_ohm: f64,
     /// Braking resistor behind the chopper, in ohm.
     pub chopper_ohm: f64,
@@ -58,7 +57,7 @@ pub struct LinkSwitches {
 /// Energies since the beginning, in J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkEnergies {
-    /// Given by the source's voltage, before its resistance; negative when it took more.
+    /// Given by the source's voltage, before its resistance; negative if it took more.
     pub source_j: f64,
     /// Turned into heat in the source's and the precharge resistor.
     pub path_j: f64,
@@ -66,14 +65,14 @@ pub struct LinkEnergies {
     pub discharge_j: f64,
     /// Likewise in the braking resistor.
     pub chopper_j: f64,
-    /// Given to the inverter; negative when braking returned more.
+    /// Given to the inverter; negative if braking returned more.
     pub inverter_j: f64,
 }
 
-/// Capacitor and bookkeeping.
+/// Capacitor and energy balance.
 #[derive(Clone, Debug)]
 pub struct DcLink {
-    /// Its parts; change them, as all of this, between two steps.
+    /// Its parts; change them, like everything here, between two steps.
     pub settings: DcLinkSettings,
     /// The switches that are closed.
     pub switches: LinkSwitches,
@@ -89,7 +88,7 @@ pub struct DcLink {
 pub(super) type LinkSlopes = [f64; 7];
 
 impl DcLink {
-    /// Empty, everything open.
+    /// Discharged, all switches open.
     pub fn new(settings: DcLinkSettings) -> Self {
         Self {
             settings,
@@ -109,12 +108,12 @@ impl DcLink {
         0.5 * self.settings.source.inductance_h * self.choke_a * self.choke_a
     }
 
-    /// `true` if the source gives its current through the choke: past the precharge resistor, which is far more than the choke.
+    /// `true` if the source's current flows through the choke; behind the precharge resistor, which far outweighs it, the choke does not count.
     fn is_choked(&self) -> bool {
         self.switches.main && self.settings.source.live && self.settings.source.inductance_h > 0.0
     }
 
-    /// Longest integration step that follows the swing between choke and capacitor, in s.
+    /// Longest integration step that resolves the oscillation between choke and capacitor, in s.
     pub(super) fn longest_step_s(&self) -> f64 {
         let DcLinkSettings { capacitance_f, source, .. } = self.settings;
         let Source { inductance_h, resistance_ohm, .. } = source;
@@ -132,7 +131,7 @@ impl DcLink {
         if reversible || choke_a > 0.0 { slope } else { slope.max(0.0) }
     }
 
-    /// Current that the source gives at a link voltage, and the resistance that it flows through.
+    /// Current from the source at a link voltage, and the resistance that it flows through.
     fn source(&self, udc_v: f64, choke_a: f64) -> (f64, f64) {
         let Source { voltage_v, resistance_ohm, reversible, live, .. } = self.settings.source;
         if !live {

@@ -1,4 +1,4 @@
-//! IGBTs and diodes that conduct: a threshold and a slope each.
+//! Conducting IGBTs and diodes: a threshold and a slope each.
 
 use super::Leg;
 
@@ -24,8 +24,8 @@ impl DeviceDrops {
         *self != Self::NONE
     }
 
-    /// By how much a leg's output is below its rail at a current out of it in A, negative above, in V: whatever conducts drops voltage
-    /// in the current's direction. `sign` is the current's, steady near zero, −1 ..= 1.
+    /// Voltage by which a leg's output is below its rail at a current out of it in A, negative if above, in V: the conducting device drops voltage in
+    /// the current's direction. `sign` is the current's, continuous near zero, −1 ..= 1.
     pub fn drop_v(&self, leg: Leg, current_a: f64, sign: f64) -> f64 {
         let by_igbt = match leg {
             Leg::Upper => current_a > 0.0,

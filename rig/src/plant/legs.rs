@@ -1,4 +1,4 @@
-//! A leg, and what its diodes do while both gates are off.
+//! A leg, and the behaviour of its diodes while both gates are off.
 
 use tractive_tablegen::SmoothMap;
 
@@ -12,12 +12,12 @@ pub enum Leg {
     Upper,
     /// Lower device on.
     Lower,
-    /// Both off: current finds its way through the diodes.
+    /// Both off: current flows through the diodes.
     Open,
 }
 
 impl Leg {
-    /// `true` if its output is at the upper rail while this current flows out of it, in A: of an open leg the diodes decide.
+    /// `true` if its output is at the upper rail while this current flows out of it, in A: for an open leg the diodes decide.
     pub fn is_high(self, current_a: f64) -> bool {
         match self {
             Self::Upper => true,
@@ -27,9 +27,9 @@ impl Leg {
     }
 }
 
-/// The diodes of an open leg: current out of the leg (positive) flows through the lower one, current into it through
-/// the upper one. In between, for currents below half a percent of the machine's largest, the leg's voltage follows the current
-/// linearly, which takes such a current away within microseconds.
+/// The diodes of an open leg: current out of the leg (positive) flows through the lower one, current into it through the upper one. In between, for
+/// currents below half a percent of the machine's largest, the leg's voltage follows the current linearly, which removes such a current within
+/// microseconds.
 #[derive(Clone, Copy, Debug)]
 pub struct Clamp {
     small_current_a: f64,
@@ -60,7 +60,7 @@ impl Clamp {
         Self { least_inductance_h: by * self.least_inductance_h, ..self }
     }
 
-    /// For two machines on one leg: the smaller current, the smaller inductance.
+    /// For two machines on one leg: the smaller current and the smaller inductance.
     pub fn of_both(self, other: &Self) -> Self {
         Self {
             small_current_a: self.small_current_a.min(other.small_current_a),
@@ -73,7 +73,7 @@ impl Clamp {
         -0.5 * udc_v * self.near_zero(current_a)
     }
 
-    /// A current over the small one, −1 ..= 1: its sign, but near zero.
+    /// A current over the small one, −1 ..= 1: its sign, except near zero.
     pub fn near_zero(&self, current_a: f64) -> f64 {
         (current_a / self.small_current_a).clamp(-1.0, 1.0)
     }
@@ -83,12 +83,12 @@ impl Clamp {
         0.5 - 0.5 * (current_a / self.small_current_a).clamp(-1.0, 1.0)
     }
 
-    /// Width of the linear zone, in A: the current below which an open leg is a resistor.
+    /// Width of the linear zone, in A: the current below which an open leg acts as a resistor.
     pub fn small_current_a(&self) -> f64 {
         self.small_current_a
     }
 
-    /// `true` if nothing is left of such a current once all legs have been open for so long on a link of this voltage.
+    /// `true` if no such current is left once all legs have been open for this long on a link of this voltage.
     pub fn takes_away(&self, udc_v: f64, time_s: f64) -> bool {
         time_s * self.slope_ohm(udc_v) >= SETTLED * self.least_inductance_h
     }
@@ -104,10 +104,10 @@ impl Clamp {
         self.step_near_s(udc_v, open.map(|(current, _)| current.abs()).fold(f64::INFINITY, f64::min))
     }
 
-    /// Longest step while the current that is nearest to zero is `nearest_a`, in s.
+    /// Longest step while the current closest to zero is `nearest_a`, in s.
     pub fn step_near_s(&self, udc_v: f64, nearest_a: f64) -> f64 {
         let stiff = STIFF_SHARE * self.least_inductance_h / self.slope_ohm(udc_v);
-        // No current moves faster than the whole link across the least inductance.
+        // No current changes faster than with the whole link voltage across the least inductance.
         let away = (nearest_a - self.small_current_a) * self.least_inductance_h / (1.5 * udc_v);
         away.clamp(stiff, LONGEST_STEP_S.max(stiff))
     }

@@ -15,18 +15,18 @@ pub struct LineFilter {
 }
 
 impl LineFilter {
-    /// For 250 kW at 1,500 V: 46 Hz, damped enough for a load of constant power.
+    /// For 250 kW at 1,500 V: 46 Hz, damped enough for a constant-power load.
     pub const TRACTION: Self = Self { inductance_h: 3e-3, resistance_ohm: 0.3, capacitance_f: 4e-3 };
 
-    /// `true` if a drive that takes a power, in W, at a voltage, in V, has to damp it: its resistance is less than twice that below which such a load makes the link
-    /// swing, `P L/(C U²)`. A battery's cable needs none.
+    /// `true` if a drive that draws a power, in W, at a voltage, in V, has to damp it: its resistance is less than twice the limit below which such a load
+    /// makes the link oscillate, `P L/(C U²)`. A battery's cable needs no damping.
     pub fn needs_damping(&self, power_w: f64, udc_v: f64) -> bool {
         let Self { inductance_h, resistance_ohm, capacitance_f } = *self;
         resistance_ohm < 2.0 * power_w * inductance_h / (capacitance_f * udc_v * udc_v)
     }
 
-    /// Shorter of the time constants: one over the angular frequency of the swing between choke and capacitor, and that of the current in choke and
-    /// resistance, in s. From 0.1 mH and 0.1 mF on it is 0.1 ms or more.
+    /// The shorter of the time constants: the inverse of the angular frequency of the oscillation between choke and capacitor, and that of the
+    /// current in choke and resistance, in s. From 0.1 mH and 0.1 mF on it is 0.1 ms or more.
     pub fn shortest_s(&self) -> f64 {
         let Self { inductance_h, resistance_ohm, capacitance_f } = *self;
         (inductance_h * capacitance_f).sqrt().min(inductance_h / resistance_ohm)
@@ -58,7 +58,7 @@ impl FromStr for LineFilter {
     }
 }
 
-/// The slope of a line that fails, in V/s.
+/// The slope of a failing line, in V/s.
 const LINE_SLOPE_V_S: f64 = 50e3;
 /// Longest step of the choke's current, in s, and as a share of the filter's shortest time constant: explicit steps are stable up to twice that.
 const LONGEST_STEP_S: f64 = 20e-6;
@@ -82,7 +82,7 @@ impl FilteredLink {
         Self { filter, line_v, choke_a: 0.0, udc_v: line_v }
     }
 
-    /// Lets time pass while the inverter takes an energy, in J, and the line goes to a voltage, in V; `None`: the line is cut off.
+    /// Lets time pass while the inverter takes an energy, in J, and the line goes to a voltage, in V; `None`: the line is disconnected.
     pub fn advance(&mut self, drawn_j: f64, dt_s: f64, line_v: Option<f64>) {
         let LineFilter { inductance_h, resistance_ohm, capacitance_f } = self.filter;
         let longest_s = LONGEST_STEP_S.min(LONGEST_SHARE * self.filter.shortest_s());
@@ -98,7 +98,7 @@ impl FilteredLink {
                     self.choke_a += across_v / inductance_h * step_s;
                 }
             }
-            // By energy, so that none is lost: what the inverter takes, the capacitor gives.
+            // Computed by energy, so that none is lost: the capacitor gives what the inverter takes.
             let given_j = self.choke_a * self.udc_v * step_s - drawn_j / steps;
             let square = self.udc_v * self.udc_v + 2.0 * given_j / capacitance_f;
             self.udc_v = square.max(1.0).sqrt();
@@ -110,7 +110,7 @@ impl FilteredLink {
 mod tests {
     use super::*;
 
-    /// The filter of the guide has to be damped with 246 kW, one with twice the resistance that such a load takes away and a battery's cable have not.
+    /// The filter of the guide has to be damped at 246 kW; a filter with twice the resistance that such a load takes away, and a battery's cable, need not.
     #[test]
     fn a_filter_that_damps_itself_needs_no_drive() {
         for (text, power_w, udc_v, needs) in [
@@ -126,7 +126,7 @@ mod tests {
         assert!("0.0009,4,30".parse::<LineFilter>().is_err());
     }
 
-    /// The smallest filters ring at their frequency, and lose no energy but in their resistance.
+    /// The smallest filters ring at their frequency, and lose energy only in their resistance.
     #[test]
     fn the_smallest_filters_ring_as_theory_says() {
         for text in ["0.001,0.1,0", "0.005,1,0"] {

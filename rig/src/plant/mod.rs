@@ -1,8 +1,7 @@
-//! The plant: a saturated machine behind three inverter legs, in f64; [`zs9`] is the one with two machines.
+//! The plant: a saturated machine behind three inverter legs, in f64; [`zs9`] is the plant with two machines.
 //!
-//! Stator equation in the rotor frame, with the smooth flux map's incremental inductances:
-//! `L(i) di/dt = u − R i − jω ψ(i)`. Amplitude-invariant, peak, electrical; d along the magnet flux; currents positive into the
-//! machine. The legs' voltages count from the link's midpoint.
+//! Stator equation in the rotor frame, with the smooth flux map's incremental inductances: `L(i) di/dt = u − R i − jω ψ(i)`. Amplitude-invariant,
+//! peak, electrical; d along the magnet flux; currents positive into the machine. The legs' voltages are measured from the link's midpoint.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod dc_link;
@@ -55,7 +54,7 @@ pub struct PlantSettings {
     pub drops: DeviceDrops,
     /// Iron loss as a torque, as a share of the loss that the machine's folder names; a plant with several motors has none.
     pub iron_share: f64,
-    /// The elastic shaft between rotor and load, where there is one.
+    /// The elastic shaft between rotor and load, if there is one.
     pub shaft: Option<ShaftSettings>,
 }
 
@@ -93,11 +92,11 @@ struct Frame {
 
 /// The quantities that are integrated: id, iq, electrical energy, copper loss, the torque's impulse.
 type State = [f64; 5];
-/// The same, and of the link its voltage, its choke's current and its five energies.
+/// The same, plus the link's voltage, its choke's current and its five energies.
 type LinkedState = [f64; 12];
 
 impl Plant {
-    /// At rest electrically, angle zero, turning as the speed source says.
+    /// Without current, angle zero, turning as the speed source says.
     pub fn new(machine: &MachineFolder, speed: SpeedSource, settings: &PlantSettings) -> Self {
         let map = SmoothMap::new(&machine.map);
         Self {
@@ -108,19 +107,19 @@ impl Plant {
         }
     }
 
-    /// Has the machine's true flux linkage be another multiple of the map's, above 0. Currents stay as they are.
+    /// Sets the machine's true flux linkage to a multiple of the map's, above 0. Currents stay as they are.
     pub fn set_flux_scale(&mut self, flux_scale: f64) {
         self.clamp = self.clamp.scaled(flux_scale / self.flux_scale);
         self.motor.stator.set_flux_scale(flux_scale);
         self.flux_scale = flux_scale;
     }
 
-    /// Has the machine's true resistance be another multiple of its rating, from 0. Currents stay as they are.
+    /// Sets the machine's true resistance to a multiple of its rating, from 0. Currents stay as they are.
     pub fn set_resistance_scale(&mut self, scale: f64) {
         self.motor.stator.set_resistance_scale(scale);
     }
 
-    /// Has the machine's magnets have another multiple of their flux linkage, from 0. Currents stay as they are.
+    /// Sets the flux linkage of the machine's magnets to a multiple of theirs, from 0. Currents stay as they are.
     pub fn set_magnet_scale(&mut self, scale: f64) {
         self.motor.stator.set_magnet_scale(scale);
     }
@@ -140,7 +139,7 @@ impl Plant {
         }
     }
 
-    /// Lets time pass with the legs and the link's switches unchanged, on a link whose voltage follows.
+    /// Lets time pass with the legs and the link's switches unchanged, on a link whose voltage changes.
     pub fn advance_on(&mut self, link: &mut DcLink, legs: [Leg; 3], dt_s: f64) {
         let mut left_s = dt_s;
         while left_s > 0.0 {
@@ -157,7 +156,7 @@ impl Plant {
         }
     }
 
-    /// The next step of so much time that is left, in s: even parts of it, but where diodes decide.
+    /// The next step out of the time that is left, in s: equal parts of it, except where diodes decide.
     fn step_s(&self, legs: &[Leg; 3], udc_v: f64, left_s: f64) -> f64 {
         if legs.contains(&Leg::Open) {
             let longest_s = self.clamp.step_s(udc_v.max(1.0), self.motor.currents_abc(), legs);
@@ -173,7 +172,7 @@ impl Plant {
         self.finish(y, dt_s);
     }
 
-    /// The same with the link's voltage as one more state: what the legs take of its current is what they give the machine.
+    /// The same with the link's voltage as one more state: the current that the legs take from the link is the current that they give the machine.
     fn step_on(&mut self, link: &mut DcLink, legs: [Leg; 3], dt_s: f64) {
         let (id, iq) = self.motor.currents_dq();
         let y0: LinkedState = [id, iq, 0.0, 0.0, 0.0, link.udc_v, link.choke_a, 0.0, 0.0, 0.0, 0.0, 0.0];

@@ -1,4 +1,4 @@
-//! A machine with its rotor, as all plants have it.
+//! A machine with its rotor, as used by all plants.
 
 use super::{PlantSettings, Rotor, SpeedSource, Stator, Vector};
 use core::f64::consts::TAU;
@@ -49,7 +49,7 @@ impl Motor {
         self.rotor.set_load_nm(load_nm);
     }
 
-    /// The rotor, to be held or let go of between two steps.
+    /// The rotor, for holding or releasing it between two steps.
     pub fn rotor_mut(&mut self) -> &mut Rotor {
         &mut self.rotor
     }
@@ -69,7 +69,7 @@ impl Motor {
         Vector::from_rotor((self.id_a, self.iq_a), self.rotor.sin_cos()).phases()
     }
 
-    /// Air-gap torque, less what the iron takes of it, in N·m.
+    /// Air-gap torque, minus the iron's part, in N·m.
     pub fn torque_nm(&self) -> f64 {
         let current = (self.id_a, self.iq_a);
         let slots_nm = self.stator.slot_torque_nm(current, self.rotor.sin_cos());
@@ -96,28 +96,28 @@ impl Motor {
         self.speed_rpm() / 60.0 * self.stator.pole_pairs
     }
 
-    /// Largest current vector that the motor has when it is short-circuited now and turns on without losses, in A.
+    /// Largest current vector of the motor if it is short-circuited now and turns on without losses, in A.
     pub fn short_circuit_peak_a(&self) -> f64 {
         self.stator.peak_on_flux_circle_a(self.id_a, self.iq_a)
     }
 
-    /// The same, or where it is more, that once its current is gone.
+    /// The same, or, if it is larger, that after the current has decayed.
     pub fn later_short_circuit_peak_a(&self) -> f64 {
         self.short_circuit_peak_a().max(self.stator.peak_on_flux_circle_a(0.0, 0.0))
     }
 
-    /// Energy of the field, above that at no current, in J.
+    /// Energy of the field, above that at zero current, in J.
     pub fn field_j(&self) -> f64 {
         self.stator.field_j(self.id_a, self.iq_a)
     }
 
-    /// Energy that the rotor gives when the gates are blocked now, in J, while this voltage (V) takes the flux linkage away.
+    /// Energy that the rotor gives if the gates are blocked now, in J, while this voltage (V) removes the flux linkage.
     pub fn braked_j(&self, against_v: f64) -> f64 {
         let speed_rad_s = self.rotor.speed_rpm() * TAU / 60.0;
         self.stator.braked_j((self.id_a, self.iq_a), speed_rad_s, against_v)
     }
 
-    /// Ends a step of `dt_s` with the currents that it leads to, and its energies: electrical, copper loss, the torque's impulse.
+    /// Ends a step of `dt_s` with the resulting currents, and its energies: electrical, copper loss, the torque's impulse.
     pub(super) fn finish(&mut self, [id_a, iq_a]: [f64; 2], energies: [f64; 3], dt_s: f64) {
         let [electrical_j, copper_j, impulse_nm_s] = energies;
         (self.id_a, self.iq_a) = (id_a, iq_a);

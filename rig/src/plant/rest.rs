@@ -1,28 +1,28 @@
 //! A machine behind open legs whose diodes block: it has no current; its rotor may turn.
 //!
-//! While its current is near zero in all phases, an open leg is a resistor, and stator and legs settle within microseconds. Once they have, nothing is left of the
-//! current. In a dead time, which is shorter, it goes as slowly as speed and link do: one implicit step follows it as far as the next event, where explicit ones
-//! would go by the microsecond.
+//! While its current is near zero in all phases, an open leg acts as a resistor, and stator and legs settle within microseconds. After that no current is left.
+//! In a dead time, which is shorter, the current changes as slowly as speed and link do: one implicit step follows it up to the next event, where explicit
+//! steps would have to be microseconds long.
 
 use super::legs::LONGEST_STEP_S;
 use super::runge_kutta::rotated;
 use super::{Frame, Leg, Plant, State, Vector};
 
-/// Change of the current within a step up to which it has settled, as a share of the linear zone's width.
+/// Change of the current within a step below which it has settled, as a share of the linear zone's width.
 const SETTLED_SHARE: f64 = 0.01;
 
 /// A step at rest.
 pub(super) struct Rest {
     /// Its length, in s.
     pub dt_s: f64,
-    /// The state that it leads to.
+    /// The state at its end.
     pub state: State,
     /// Current that the legs take from the link, in A.
     pub link_a: f64,
 }
 
 impl Plant {
-    /// The step of at most `left_s` that the machine makes at rest; `None`: it is not at rest.
+    /// The step of at most `left_s` that the machine makes at rest; `None` if it is not at rest.
     pub(super) fn rest(&self, legs: [Leg; 3], udc_v: f64, left_s: f64) -> Option<Rest> {
         let small_a = self.clamp.small_current_a();
         let is_within = |(d, q): (f64, f64), most_a: f64| d * d + q * q <= most_a * most_a;
@@ -52,7 +52,7 @@ impl Plant {
         Some(Rest { dt_s, state, link_a })
     }
 
-    /// The largest voltage between two of its lines that the machine without current has at an instant, in V.
+    /// Largest voltage between two lines of the machine without current at an instant, in V.
     fn emf_between_lines_v(&self, Frame { sin_cos, omega }: Frame) -> f64 {
         let emf_v = Vector::from_rotor(self.motor.stator.emf_v(omega, sin_cos), sin_cos).phases();
         let [most, least] = [f64::max, f64::min].map(|of| emf_v.into_iter().fold(emf_v[0], of));
@@ -90,8 +90,8 @@ mod tests {
         DcLink { udc_v: voltage_v, ..DcLink::new(settings) }
     }
 
-    /// At rest, and by steps of 0.1 µs all the way: the same currents, energies and link, of a machine that is let
-    /// go of with nearly all of the linear zone's current.
+    /// Compares the method at rest with steps of 0.1 µs throughout: the same currents, energies and link, for a machine that is released with nearly
+    /// all of the linear zone's current.
     fn does_what_small_steps_say(name: &str, settings: &PlantSettings) {
         const DT_S: f64 = 2e-6;
         let [mut rests, mut steps] = [(); 2].map(|()| {
@@ -131,7 +131,7 @@ mod tests {
         does_what_small_steps_say("pmsm-48v-1kw", &PlantSettings::default());
     }
 
-    /// One whose EMF is beyond the link's voltage charges it: it is not at rest.
+    /// A machine whose EMF exceeds the link's voltage charges the link: it is not at rest.
     #[test]
     fn a_machine_that_charges_the_link_is_not_at_rest() {
         let (mut plant, _) = plant("pmasynrm-180kw", 6_000.0, &PlantSettings::default());
@@ -139,7 +139,7 @@ mod tests {
         assert!(plant.rest(OPEN, 300.0, 1e-5).is_none());
     }
 
-    /// The largest current in the last 15 ms of 20, in A, of a machine that is let go of with a fifth of its largest current, on a link of so many times its EMF
+    /// The largest current in the last 15 ms of 20, in A, of a machine released with a fifth of its largest current, on a link of this multiple of its EMF
     /// between lines at the end.
     fn current_left_a(name: &str, settings: &PlantSettings, over_emf: f64) -> f64 {
         let (mut plant, _) = plant(name, 1_000.0, settings);
@@ -169,7 +169,7 @@ mod tests {
         }
     }
 
-    /// The iron alone takes energy from its rotor.
+    /// Only the iron takes energy from its rotor.
     #[test]
     fn a_machine_at_rest_gives_nothing_and_takes_what_its_iron_does() {
         for iron_share in [0.0, 1.0] {

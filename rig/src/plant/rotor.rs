@@ -1,4 +1,4 @@
-//! A rotor: angle, speed, and what turns it.
+//! A rotor: angle, speed, and its drive.
 
 use super::shaft::{Shaft, ShaftSettings};
 use super::speed::{SpeedSource, profile_speed};
@@ -18,7 +18,7 @@ pub struct Rotor {
     speed_rad_s: f64,
     /// Torque of friction of a free rotor, in N·m.
     friction_nm: f64,
-    /// The elastic shaft between it and what turns it; `None`: they are one.
+    /// The elastic shaft between the rotor and its drive; `None`: they are one body.
     shaft: Option<Shaft>,
 }
 
@@ -35,7 +35,7 @@ impl Rotor {
         Self { source, pole_pairs, time_s, angle_turns, sin_cos, speed_rad_s, friction_nm, shaft: None }
     }
 
-    /// The same on an elastic shaft, if there is one: what turns it, or is turned by it, is at the far end.
+    /// The same on an elastic shaft, if there is one: the drive or load is at the far end.
     pub fn on_shaft(mut self, shaft: Option<ShaftSettings>) -> Self {
         self.shaft = shaft.map(|settings| Shaft::new(settings, self.speed_rad_s));
         self
@@ -81,12 +81,12 @@ impl Rotor {
         }
     }
 
-    /// Gives a free rotor friction: a torque against either direction, and up to that against any that would turn it at rest, in N·m.
+    /// Gives a free rotor friction, in N·m: a torque against either direction of rotation; at rest it holds the rotor against any torque up to that value.
     pub fn set_friction_nm(&mut self, torque_nm: f64) {
         self.friction_nm = torque_nm;
     }
 
-    /// The torque that is left of one, in N·m, where friction takes its part: beyond rest it turns nothing back.
+    /// The part of a torque, in N·m, that remains after friction: friction never turns a rotor back beyond rest.
     fn beyond_friction_nm(&self, torque_nm: f64, speed_rad_s: f64, (inertia_kg_m2, dt_s): (f64, f64)) -> f64 {
         if self.friction_nm == 0.0 {
             return torque_nm;
@@ -104,12 +104,12 @@ impl Rotor {
         self.source = SpeedSource::profile(vec![(self.time_s, from_rpm), (there_s, speed_rpm)]);
     }
 
-    /// Lets go of the rotor with an inertia in kg·m², above 0, and a load against forward rotation in N·m.
+    /// Releases the rotor with an inertia in kg·m², above 0, and a load against forward rotation in N·m.
     pub fn release(&mut self, inertia_kg_m2: f64, load_nm: f64) {
         self.source = SpeedSource::Inertia { inertia_kg_m2, load_nm };
     }
 
-    /// The step that begins now and lasts `dt_s`, with an air-gap torque that is asked for only where it counts.
+    /// The step that begins now and lasts `dt_s`, with an air-gap torque that is evaluated only if it matters.
     #[inline]
     pub fn turning(&self, torque_nm: impl FnOnce() -> f64, dt_s: f64) -> Turning {
         let acceleration = match (&self.shaft, &self.source) {
@@ -145,8 +145,8 @@ impl Rotor {
         impulse_nm_s * mean_speed
     }
 
-    /// The speed, in rad/s, after a step from this one for what the source turns, or is turned by, without an inertia in kg·m² that is not part of it,
-    /// with an impulse in N·m·s.
+    /// The speed, in rad/s, after a step from this one of what the source turns, or is turned by, excluding an inertia in kg·m² that is not part of
+    /// it, with an impulse in N·m·s.
     fn drive(&mut self, speed_rad_s: f64, (impulse_nm_s, without_kg_m2): (f64, f64), dt_s: f64) -> f64 {
         let began_s = self.time_s;
         let after_rad_s = match &self.source {
@@ -195,13 +195,13 @@ pub struct Turning {
 }
 
 impl Turning {
-    /// Electrical speed a time after the step's beginning, in rad/s.
+    /// Electrical speed at a time after the step's beginning, in rad/s.
     #[inline]
     pub fn omega(&self, t_s: f64) -> f64 {
         self.pole_pairs * (self.speed_rad_s + self.acceleration * t_s)
     }
 
-    /// Electrical angle turned by since the step's beginning, in rad.
+    /// Electrical angle turned since the step's beginning, in rad.
     #[inline]
     pub fn turned(&self, t_s: f64) -> f64 {
         self.pole_pairs * (self.speed_rad_s + 0.5 * self.acceleration * t_s) * t_s

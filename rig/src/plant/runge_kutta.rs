@@ -1,4 +1,4 @@
-//! Runge–Kutta steps, as all plants make them.
+//! Runge–Kutta steps, used by all plants.
 
 /// A state moved along its rates of change.
 #[inline]
@@ -10,7 +10,7 @@ pub fn along<const N: usize>(y: &[f64; N], slope: &[f64; N], dt_s: f64) -> [f64;
     out
 }
 
-/// A state after a step of fourth order, by its rates of change in the frames of the step's beginning, middle and end.
+/// A state after a fourth-order step, from its rates of change in the frames of the step's beginning, middle and end.
 #[inline]
 pub fn stepped<const N: usize, F>(
     y0: &[f64; N],
@@ -29,7 +29,7 @@ pub fn stepped<const N: usize, F>(
     y
 }
 
-/// Sine and cosine of an angle after turning by another one, of which sine and cosine are given.
+/// Sine and cosine of an angle after a rotation by another one, of which sine and cosine are given.
 #[inline]
 pub fn rotated((sin, cos): (f64, f64), (s, c): (f64, f64)) -> (f64, f64) {
     (sin * c + cos * s, cos * c - sin * s)

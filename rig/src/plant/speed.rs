@@ -25,7 +25,7 @@ impl SpeedSource {
         Self::Profile(points)
     }
 
-    /// Inertia of all that turns, in kg·m²; `None` where a speed is prescribed.
+    /// Inertia of all that turns, in kg·m²; `None` if a speed is prescribed.
     pub fn inertia_kg_m2(&self) -> Option<f64> {
         match self {
             Self::Profile(_) => None,

@@ -10,13 +10,13 @@ use tractive_tablegen::{FluxMap, FluxPoint, Iron, MachineFolder, SmoothMap};
 pub struct Stator {
     flux: Flux,
     scale: f64,
-    /// Flux linkage of the magnets that warmth has taken, in Wb.
+    /// Flux linkage of the magnets lost through warming, in Wb.
     lost_wb: f64,
     /// Pole pairs.
     pub pole_pairs: f64,
     rated_ohm: f64,
     resistance_ohm: f64,
-    /// Amplitude of the magnets' flux linkage that goes six times with the angle, in Wb.
+    /// Amplitude of the magnets' flux-linkage harmonic of order six over the angle, in Wb.
     slots_wb: f64,
     iron: Iron,
 }
@@ -26,7 +26,7 @@ pub struct Stator {
 enum Flux {
     /// A saturated machine: splines through the nodes.
     Smooth(SmoothMap),
-    /// A linear one, which needs no search for a cell: `ψ_d = ψ_f + L_d i_d`, `ψ_q = L_q i_q`.
+    /// A linear machine, which needs no cell search: `ψ_d = ψ_f + L_d i_d`, `ψ_q = L_q i_q`.
     Linear { magnet_wb: f64, ld_h: f64, lq_h: f64 },
 }
 
@@ -41,15 +41,15 @@ pub struct StatorSlopes {
     pub electrical_w: f64,
     /// Copper loss, in W: `1.5 R |i|²`.
     pub copper_w: f64,
-    /// Air-gap torque, in N·m: `1.5 n_p (ψ_d i_q − ψ_q i_d)`; less what the iron takes.
+    /// Air-gap torque, in N·m: `1.5 n_p (ψ_d i_q − ψ_q i_d)`; minus the iron's part.
     pub torque_nm: f64,
 }
 
-/// Deviation from a plane that is rounding in the file, as a share of the largest flux linkage.
+/// Deviation from a plane that counts as rounding in the file, as a share of the largest flux linkage.
 const LINEAR_TOLERANCE: f64 = 1e-7;
 /// Order of the slots' harmonic over the electrical angle.
 const SLOT_ORDER: f64 = 6.0;
-/// Pieces of the way from zero current along which the field's energy is added up.
+/// Number of pieces of the way from zero current along which the field's energy is summed.
 const FIELD_PIECES: u32 = 500;
 
 impl Flux {
@@ -63,7 +63,7 @@ impl Flux {
 }
 
 impl Stator {
-    /// For a machine that differs from its folder as the settings say.
+    /// Made for a machine that differs from its folder as the settings say.
     pub fn new(machine: &MachineFolder, settings: &PlantSettings) -> Self {
         let parameters = &machine.parameters;
         let flux = linear(&machine.map).unwrap_or_else(|| Flux::Smooth(SmoothMap::new(&machine.map)));
@@ -80,17 +80,17 @@ impl Stator {
         }
     }
 
-    /// Has the true flux linkage be another multiple of the map's. Currents stay.
+    /// Sets the true flux linkage to a multiple of the map's. Currents stay.
     pub(super) fn set_flux_scale(&mut self, scale: f64) {
         self.scale = scale;
     }
 
-    /// Has the true resistance be another multiple of the rating. Currents stay.
+    /// Sets the true resistance to a multiple of the rating. Currents stay.
     pub(super) fn set_resistance_scale(&mut self, scale: f64) {
         self.resistance_ohm = self.rated_ohm * scale;
     }
 
-    /// Has the magnets have another multiple of their flux linkage; the iron's stays. So do the currents.
+    /// Sets the magnets' flux linkage to a multiple of theirs; the iron's part stays, and so do the currents.
     pub(super) fn set_magnet_scale(&mut self, scale: f64) {
         self.lost_wb = (1.0 - scale) * self.scale * self.flux.magnet_wb();
     }
@@ -131,7 +131,7 @@ impl Stator {
         1.5 * self.pole_pairs * (flux.psi_d_wb * iq_a - flux.psi_q_wb * id_a)
     }
 
-    /// The part of the torque that the slots make at a current, with the rotor at an angle of this sine and cosine, in N·m.
+    /// The part of the torque caused by the slots at a current, with the rotor at an angle of this sine and cosine, in N·m.
     pub fn slot_torque_nm(&self, (id, iq): (f64, f64), rotor: (f64, f64)) -> f64 {
         if self.slots_wb == 0.0 {
             return 0.0;
@@ -153,16 +153,16 @@ impl Stator {
         self.iron.torque_nm(square, omega)
     }
 
-    /// The voltage that the slots induce with the rotor at an angle of this sine and cosine, rotor frame, over the electrical speed, in Wb. The flux linkage is
-    /// `h (cos 6θ, 0)`, whose change and turn are `h (−6 sin 6θ, cos 6θ)`.
+    /// The voltage that the slots induce with the rotor at an angle of this sine and cosine, rotor frame, divided by the electrical speed, in Wb. The flux
+    /// linkage is `h (cos 6θ, 0)`; its change and rotation are `h (−6 sin 6θ, cos 6θ)`.
     fn slots(&self, rotor: (f64, f64)) -> (f64, f64) {
         let twice = rotated(rotor, rotor);
         let (sin, cos) = rotated(rotated(twice, twice), twice);
         (-SLOT_ORDER * self.slots_wb * sin, self.slots_wb * cos)
     }
 
-    /// The stator equation with the rotor at an angle of the sine and cosine `rotor`; see [`Self::slopes`], which knows of neither slots nor
-    /// iron loss.
+    /// The stator equation with the rotor at an angle of the sine and cosine `rotor`; see [`Self::slopes`], which includes neither slots nor iron
+    /// loss.
     #[inline]
     pub fn slopes_at(
         &self,
@@ -201,8 +201,7 @@ impl Stator {
         }
     }
 
-    /// The stator equation at a current in A, under a voltage in V, both in the rotor frame, which turns with the
-    /// electrical speed `omega` in rad/s.
+    /// The stator equation at a current in A, under a voltage in V, both in the rotor frame, which turns with the electrical speed `omega` in rad/s.
     #[inline]
     pub fn slopes(&self, (id, iq): (f64, f64), (ud, uq): (f64, f64), omega: f64) -> StatorSlopes {
         let flux = self.flux(id, iq);
@@ -225,8 +224,8 @@ impl Stator {
         (omega * (slot_d - flux.psi_q_wb), omega * (slot_q + flux.psi_d_wb))
     }
 
-    /// The change of a current in A over `dt_s`, in A, by one implicit step, with a resistance in ohm between each phase and a common point, where it changes at these
-    /// rates in A/s now: `(L/dt + R + jωL) Δi = L di/dt`.
+    /// The change of a current in A over `dt_s`, in A, by one implicit step, with a resistance in ohm between each phase and a common point, if it now changes
+    /// at these rates in A/s: `(L/dt + R + jωL) Δi = L di/dt`.
     pub fn settles(
         &self,
         (id, iq): (f64, f64),
@@ -244,16 +243,16 @@ impl Stator {
         ((qq * vd - dq * vq) / det, (dd * vq - qd * vd) / det)
     }
 
-    /// Energy that the rotor gives when the gates are blocked, in J, at a current in A and a speed in mechanical rad/s: its power falls
-    /// to nothing while `against_v` takes the flux linkage away.
+    /// Energy that the rotor gives if the gates are blocked, in J, at a current in A and a speed in mechanical rad/s: its power falls to zero while
+    /// `against_v` removes the flux linkage.
     pub fn braked_j(&self, (id_a, iq_a): (f64, f64), speed_rad_s: f64, against_v: f64) -> f64 {
         let flux = self.flux(id_a, iq_a);
         let decay_s = hypot(flux.psi_d_wb, flux.psi_q_wb) / against_v;
         0.5 * (self.torque_nm(id_a, iq_a) * speed_rad_s).abs() * decay_s
     }
 
-    /// Largest current whose flux linkage is as large as that of a current in A: what a short circuit leads to when the rotor turns
-    /// under a flux linkage that stands still.
+    /// Largest current with the same flux linkage magnitude as a current in A: the result of a short circuit when the rotor turns under a flux
+    /// linkage that stands still.
     pub fn peak_on_flux_circle_a(&self, id_a: f64, iq_a: f64) -> f64 {
         const ANGLES: u32 = 180;
         const STEPS: u32 = 20;
@@ -275,9 +274,9 @@ impl Stator {
         most
     }
 
-    /// Energy of the field at a current, above that at no current, in J: `1.5 ∫ i·dψ` along a straight line from zero.
+    /// Energy of the field at a current, above that at zero current, in J: `1.5 ∫ i·dψ` along a straight line from zero.
     pub fn field_j(&self, id_a: f64, iq_a: f64) -> f64 {
-        // i·dψ = x iᵀ L(x i) i dx, by the middles of the pieces.
+        // i·dψ = x iᵀ L(x i) i dx, evaluated in the middle of each piece.
         let pieces = if matches!(self.flux, Flux::Linear { .. }) { 1 } else { FIELD_PIECES };
         let sum: f64 = (0..pieces)
             .map(|k| {
@@ -290,7 +289,7 @@ impl Stator {
     }
 }
 
-/// The flux of a map that is a plane in every node.
+/// The flux of a map that is a plane at every node.
 fn linear(map: &FluxMap) -> Option<Flux> {
     let (rows, columns) = (map.id_a.len(), map.iq_a.len());
     let last = rows * columns - 1;

@@ -1,19 +1,19 @@
-//! The time of the plant's steps, of all that a thread does.
+//! The time that the plant's steps take, out of all that a thread does.
 
 pub use crate::platform::processor_s;
 use std::cell::Cell;
 
-/// Of so many steps of the plant one is timed.
+/// One out of this many steps of the plant is timed.
 const TIMED: u64 = 16;
 
 thread_local! {
     static STEPS: Cell<u64> = const { Cell::new(0) };
     static IN_PLANT: Cell<f64> = const { Cell::new(0.0) };
-    /// The cost of taking the time, in s.
+    /// The cost of reading the clock, in s.
     static TAKING: Cell<f64> = const { Cell::new(0.0) };
 }
 
-/// Does a step of the plant, and once in a while takes its time.
+/// Does a step of the plant, and times it once in a while.
 #[inline]
 pub fn in_plant<R>(step: impl FnOnce() -> R) -> R {
     let count = STEPS.get();
@@ -27,7 +27,7 @@ pub fn in_plant<R>(step: impl FnOnce() -> R) -> R {
     result
 }
 
-/// Begins to count on this thread.
+/// Begins counting on this thread.
 pub fn begin() {
     STEPS.set(0);
     IN_PLANT.set(0.0);
@@ -39,7 +39,7 @@ pub fn begin() {
     TAKING.set((processor_s() - began_s) / f64::from(TRIES));
 }
 
-/// Steps of the plant since [`begin`], and what they took, in s.
+/// Number of the plant's steps since [`begin`], and the time that they took, in s.
 pub fn taken() -> (u64, f64) {
     (STEPS.get(), IN_PLANT.get() * TIMED as f64)
 }

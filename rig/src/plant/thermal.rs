@@ -1,6 +1,6 @@
-//! The warmth of machine and inverter: two nodes of the stator, a heat sink, a junction of each phase, magnets; and the resistive sensors on them.
+//! Temperatures of machine and inverter: two nodes of the stator, a heat sink, a junction of each phase, magnets; and the resistive sensors on them.
 //!
-//! The devices' losses warm only: the link does not give them.
+//! The devices' losses only produce heat: they are not taken from the link.
 
 use super::Plant;
 use tractive::thermal::{DeviceLosses, Element, Ratios, Sensor};
@@ -15,16 +15,16 @@ pub struct Node {
 }
 
 impl Node {
-    /// A node that warms by so many K per W in a time constant in s.
+    /// A node that warms by this many K per W with a time constant in s.
     pub fn new(k_per_w: f64, time_s: f64) -> Self {
         Self { j_per_k: time_s / k_per_w, k_per_w }
     }
 }
 
-/// The properties of what warms.
+/// The properties of the parts that warm.
 #[derive(Clone, Copy, Debug)]
 pub struct HeatSettings {
-    /// Coolant, in °C: where everything begins.
+    /// Coolant temperature, in °C: the initial temperature of everything.
     pub coolant_c: f64,
     /// The winding's hottest place, to the stator at the sensor.
     pub hottest: Node,
@@ -51,7 +51,7 @@ pub enum Wire {
     Sound,
     /// Off.
     Unplugged,
-    /// Both ends together.
+    /// Both ends connected.
     Shorted,
     /// The sensor shows another temperature, in °C.
     Shows(f64),
@@ -60,7 +60,7 @@ pub enum Wire {
 /// Wires of both sensors from a time on, in s.
 pub type Wired = (f64, [Wire; 2]);
 
-/// Warmth of machine and inverter.
+/// Temperatures of machine and inverter.
 #[derive(Clone, Debug)]
 pub struct Heat {
     settings: HeatSettings,
@@ -94,13 +94,13 @@ impl Heat {
         }
     }
 
-    /// The same with wires that are not sound from these times on.
+    /// The same with wires that are faulty from these times on.
     pub fn wired(mut self, wires: Vec<Wired>) -> Self {
         self.wires = wires;
         self
     }
 
-    /// The losses of `dt_s`; the machine's resistance, rated at 20 °C, and its magnets follow.
+    /// Adds the losses of `dt_s`; the machine's resistance, rated at 20 °C, and its magnets follow.
     pub fn step(&mut self, plant: &mut Plant, udc_v: f64, dt_s: f64) {
         let HeatSettings { coolant_c, hottest, stator, junction, heat_sink, ref losses, .. } = self.settings;
         let copper_j = plant.motor.energies.copper_j - self.copper_j;
@@ -114,7 +114,7 @@ impl Heat {
             let loss_j = f64::from(losses.watts(current_a.abs() as f32, udc_v as f32)) * dt_s;
             let down_j = (*celsius - self.heat_sink_c) / junction.k_per_w * dt_s;
             *celsius += (loss_j - down_j) / junction.j_per_k;
-            // Of two devices.
+            // For two devices.
             sunk_j += 2.0 * down_j;
         }
         let cooled_j = (self.heat_sink_c - coolant_c) / heat_sink.k_per_w * dt_s;
@@ -122,7 +122,7 @@ impl Heat {
         let junction_c = self.junctions_c.into_iter().fold(f64::MIN, f64::max);
         let [winding, devices] = &mut self.highest_c;
         (*winding, *devices) = (winding.max(self.hottest_c), devices.max(junction_c));
-        // The resistance is that of the whole winding, warmer than its sensor and colder than its hottest place.
+        // The resistance is that of the whole winding, warmer than at its sensor and colder than at its hottest place.
         let winding_c = 0.5 * (self.hottest_c + self.stator_c);
         plant.set_resistance_scale(1.0 + 3.93e-3 * (winding_c - 20.0));
         plant.set_magnet_scale(1.0 + self.settings.magnets_per_k * (self.settings.magnets_c - 20.0));
@@ -154,7 +154,7 @@ fn ratio(sensor: &Sensor, wire: Wire, celsius: f64) -> u16 {
     ((share * 4_096.0) as u16).min(4_095) << 4
 }
 
-/// The resistance after the element's law: IEC 60751, or the thermistor's.
+/// The resistance by the element's law: IEC 60751, or the thermistor's.
 fn resistance_ohm(element: Element, celsius: f64) -> f64 {
     match element {
         Element::Ntc { at_25_ohm, beta_k } => {

@@ -10,7 +10,7 @@ pub struct Vector {
 }
 
 impl Vector {
-    /// Of three phases; what they have in common drops out.
+    /// Made of three phases; their common component drops out.
     #[inline]
     pub fn clarke([a, b, c]: [f64; 3]) -> Self {
         Self { alpha: (2.0 * a - b - c) / 3.0, beta: (b - c) / 3.0_f64.sqrt() }
@@ -23,13 +23,13 @@ impl Vector {
         [self.alpha, x + y, x - y]
     }
 
-    /// Out of a frame that stands at an angle of this sine and cosine.
+    /// Transformed from a frame at an angle of this sine and cosine.
     #[inline]
     pub fn from_rotor((d, q): (f64, f64), (sin, cos): (f64, f64)) -> Self {
         Self { alpha: d * cos - q * sin, beta: d * sin + q * cos }
     }
 
-    /// Into such a frame.
+    /// Transformed into such a frame.
     #[inline]
     pub fn to_rotor(self, (sin, cos): (f64, f64)) -> (f64, f64) {
         (self.alpha * cos + self.beta * sin, self.beta * cos - self.alpha * sin)

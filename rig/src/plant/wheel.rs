@@ -1,11 +1,11 @@
-//! A wheel set on its rail: the rotor turns the wheels, grip drives the train. All of it as seen from the motor's shaft.
+//! A wheel set on its rail: the rotor turns the wheels, adhesion drives the train. All quantities are referred to the motor's shaft.
 //!
 //! `J dω/dt = T − T_grip`, `J_train dv/dt = T_grip`, with `T_grip = T_most 2x/(1 + x²)` at a creep of `x` times the best one: it rises to a peak and falls
-//! beyond it, so that a wheel that is driven harder than the rail bears runs away.
+//! beyond it, so that a wheel driven harder than the rail bears runs away.
 
 /// Creep at which the rail bears most, as a share of the train's speed.
 const BEST_CREEP: f64 = 0.02;
-/// Least speed that creep is a share of, in rad/s.
+/// Least speed to which creep is related, in rad/s.
 const LEAST_RAD_S: f64 = 5.0;
 
 /// A wheel set, its rail and its train.
@@ -17,7 +17,7 @@ pub struct Wheel {
     pub train_kg_m2: f64,
     /// Largest torque that a dry rail bears, in N·m.
     pub most_nm: f64,
-    /// Stretches of bad rail: from and until (s from the run's beginning), share of the dry rail's grip.
+    /// Stretches of bad rail: start and end (s from the run's beginning), share of the dry rail's grip.
     pub bad: Vec<(f64, f64, f64)>,
     /// The train's speed, mechanical, in rad/s.
     pub train_rad_s: f64,

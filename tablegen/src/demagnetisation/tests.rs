@@ -1,9 +1,9 @@
-//! The highest i_d beside a search on the closed form, on a machine without saturation.
+//! The highest i_d compared with a search on the closed form, for a machine without saturation.
 
 use super::*;
 use crate::testing::{IPM, MOST_A, RESISTANCE_OHM, near};
 
-/// Goes down from no current in small steps.
+/// Goes down in small steps from zero current.
 fn by_search(torque_nm: f64, omega: f64, voltage_v: f64) -> Option<f64> {
     (0..=200_000).map(|k| -MOST_A * f64::from(k) / 200_000.0).find(|id| {
         let iq = torque_nm / IPM.torque_nm(*id, 1.0);
@@ -45,7 +45,7 @@ fn the_highest_id_is_what_a_search_finds() {
     assert!(some > 10 && none > 5, "{some}, {none}");
 }
 
-/// All that the largest current gives takes the one i_d of its optimum.
+/// The largest torque of the largest current needs exactly the i_d of its optimum.
 #[test]
 fn the_most_torque_takes_its_own_id() {
     let machine = IPM.folder(&[]);
@@ -70,7 +70,7 @@ fn points_of_a_machine() {
     near(fast.voltage_v, 159.154_943_092, 1e-9);
 }
 
-/// Refused beside the highest value that each point leaves, and named with it.
+/// Refused above the highest value that every point allows, accepted below it; the message names that value.
 #[test]
 fn a_limit_is_held_against_each_point() {
     let mut machine = IPM.folder(&[]);

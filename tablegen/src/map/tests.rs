@@ -1,4 +1,4 @@
-//! Cells by value, and the line that they come from.
+//! Values of cells, and the line that they come from.
 
 use super::*;
 
@@ -22,7 +22,7 @@ fn a_cell_comes_from_its_own_line_or_its_images() {
     }
 }
 
-/// Flux linkage with a part that grows with the product of both currents: a cell's means are those at its middle.
+/// Flux linkage with a part proportional to the product of both currents: a cell's means are the values at its middle.
 fn bilinear(d_by_q: f64, q_by_d: f64) -> FluxMap {
     let (id_a, iq_a) = (vec![-3.0, -1.0, 1.0], vec![-1.5, 0.0, 1.5, 3.0]);
     let nodes = || id_a.iter().flat_map(|d| iq_a.iter().map(move |q| (*d, *q)));
@@ -51,7 +51,7 @@ fn cells_have_the_inductances_at_their_middle() {
     }
 }
 
-/// 5 % of the largest self inductance, here 3.0: of both, the q axis's, in the cells from id −1 on.
+/// 5 % of the largest self inductance, here 3.0: the larger one of the two axes, the q axis's, in the cells from id −1 on.
 #[test]
 fn cross_inductances_agree_within_a_share_of_the_largest() {
     let nodes = [node(7, 1.0, 1.5)];
@@ -117,7 +117,7 @@ fn nodes_in_order() {
     assert_eq!((largest(&nodes), largest(&nodes[1..]), largest(&[])), (3.0, 2.0, 0.0));
 }
 
-/// A deviation as large as the tolerance is measurement, and beyond it is not: 1 % of 100 Wb, a thousandth of a step of 1,000 A.
+/// A deviation equal to the tolerance counts as measurement error, a larger one does not: 1 % of 100 Wb, a thousandth of a step of 1,000 A.
 #[test]
 fn what_is_even_within_the_tolerance() {
     let file = Path::new("flux_map.csv");
@@ -145,7 +145,7 @@ fn what_is_even_within_the_tolerance() {
     let map = of(0.0, 0.5, 0.25).unwrap();
     assert_eq!(map.psi_d_wb, [99.75, 80.0, 99.75]);
     assert_eq!(map.psi_q_wb, [-49.875, 0.0, 49.875]);
-    // The first step is the one that counts: it has the deviation, too.
+    // The first step is the reference: it has the deviation, too.
     assert!(of(0.9, 0.0, 0.0).is_ok() && of(-1.0, 0.0, 0.0).is_ok() && of(1.1, 0.0, 0.0).is_err());
     assert!(of(-1.1, 0.0, 0.0).is_err());
     let shifted = [-999.5, 0.5, 1_000.5];
@@ -175,7 +175,7 @@ fn one_sign_of_iq_is_mirrored() {
     assert_eq!(map.psi_q_wb, [-30.0, -20.0, 0.0, 20.0, 30.0]);
 }
 
-/// A thousandth of a step: of a mean of 1,000 A, one.
+/// A thousandth of a step: 1 A for a mean step of 1,000 A.
 #[test]
 fn an_axis_is_even_within_a_thousandth_of_its_step() {
     let file = Path::new("flux_map.csv");
@@ -192,14 +192,14 @@ fn an_axis_is_even_within_a_thousandth_of_its_step() {
         axes(&nodes, file).is_ok()
     };
     assert!(from(0.0) && from(-1.5) && !from(0.1));
-    // The one to look at is the first that is off by more than that.
+    // The one to report is the first that is off by more than that.
     let id = [-3_000.0, -2_000.0, -999.0, 500.0];
     let nodes: Vec<_> = (2..).zip(id).map(|(line, id)| node(line, id, 0.0)).collect();
     let said = axes(&nodes, file).unwrap_err().to_string();
     assert!(said.contains("csv:5: id_a: 500: must be 0, on an even grid of step 1000"), "{said}");
 }
 
-/// Not even the same flux linkage twice.
+/// The same flux linkage twice is not allowed either.
 #[test]
 fn flux_rises_with_its_own_current() {
     let file = Path::new("flux_map.csv");

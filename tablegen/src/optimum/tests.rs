@@ -1,4 +1,4 @@
-//! The least current beside its closed form, on machines without saturation.
+//! The least current compared with its closed form, on machines without saturation.
 
 use super::*;
 use crate::testing::{IPM, Linear, MOST_A, POLE_PAIRS, near};
@@ -10,7 +10,7 @@ fn the_largest_value_is_found_wherever_it_lies() {
         let found = largest(-1.0, 2.0, |x| -(x - at) * (x - at));
         assert!((found - at).abs() < 1e-6, "{found}, not {at}");
     }
-    // A corner is found as sharply as it is.
+    // A corner is found just as precisely.
     let found = largest(-1.0, 2.0, |x: f64| -(x - 0.123_456_789).abs());
     assert!((found - 0.123_456_789).abs() < 1e-10, "{found}");
 }
@@ -34,7 +34,7 @@ fn the_best_angle_is_the_closed_forms() {
     assert_eq!((optimum.least_current(0.0), optimum.least_current(-5.0)), ((0.0, 0.0), (0.0, 0.0)));
 }
 
-/// With more inductance along the magnets the optimum lies at i_d > 0.
+/// With a larger inductance along the magnets the optimum lies at i_d > 0.
 #[test]
 fn the_best_angle_may_lie_on_the_other_side() {
     let other = Linear { ld_h: 0.012, lq_h: 0.006, psi_m_wb: 0.2 };
@@ -54,7 +54,7 @@ fn the_best_angle_may_lie_on_the_other_side() {
     assert!(angle > -FRAC_PI_4);
 }
 
-/// The demagnetisation limit holds: where the optimum lies beyond, i_d stands at the limit.
+/// The demagnetisation limit holds: if the optimum lies beyond it, i_d stays at the limit.
 #[test]
 fn least_current_keeps_the_least_id() {
     let machine = IPM.folder(&[
@@ -80,7 +80,8 @@ fn least_current_keeps_the_least_id() {
     }
 }
 
-/// Without saturation torque over flux linkage is curved by the saliency alone: as the product of both axes, so as much along as it is less across.
+/// Without saturation the torque's curvature over flux linkage comes from the saliency alone: the torque is the product of both axes, so across the
+/// flux linkage it is the negative of that along.
 #[test]
 fn the_curvature_is_the_saliencys() {
     let machine = IPM.folder(&[]);

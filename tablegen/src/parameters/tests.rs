@@ -1,4 +1,4 @@
-//! Ratings beside each other by value, words, ranges at their ends.
+//! Values of ratings relative to each other, words, ranges at their ends.
 
 use super::*;
 use crate::testing::{IPM, near};
@@ -9,7 +9,7 @@ fn reference() -> Parameters {
     Parameters::read(&file).unwrap()
 }
 
-/// The reference machine's, with some of its keys' lines instead.
+/// The reference machine's parameters, with some keys' lines replaced.
 fn with(lines: &[&str]) -> Result<Parameters, InputError> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/pmasynrm-180kw/machine.toml");
     let good = std::fs::read_to_string(file).unwrap();
@@ -65,7 +65,7 @@ fn orders_of_the_reference_machine() {
     }
 }
 
-/// Equal values are good where they may be equal, and values just beyond are not; the other way round where they may not.
+/// Equal values are accepted where they may be equal, and values just beyond are not; the other way round where they may not.
 #[test]
 fn orders_at_equality() {
     for (line, beyond) in [
@@ -85,7 +85,7 @@ fn orders_at_equality() {
         ("trip_current_a = 233.346", "trip_current_a = 233.345"),
         ("trip_speed_rpm = 6000.001", "trip_speed_rpm = 6000.0"),
     ] {
-        // A rated torque that large is more power than the machine's.
+        // With a rated torque that large the rated power exceeds the machine's.
         let good = with(&[line, "rated_speed_rpm = 1500.0"]);
         assert!(good.is_ok(), "{line}: {:?}", good.err().map(|error| error.to_string()));
         let wrong = with(&[beyond, "rated_speed_rpm = 1500.0"]);

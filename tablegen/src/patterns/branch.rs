@@ -9,7 +9,7 @@ use std::f64::consts::FRAC_PI_2;
 pub const STEP: f64 = 0.01;
 /// Starts at the anchor.
 const STARTS: u32 = 200;
-/// Shortest pulse, in s, with some room for control to move its edges.
+/// Shortest pulse, in s, with some margin so that control can move its edges.
 const SHORTEST_S: f64 = 12e-6;
 
 /// A branch that the drive uses.
@@ -23,16 +23,15 @@ pub struct Branch {
     pub starts_high: bool,
     /// Carrier halves in 30°: each has no more than one edge of a phase.
     pub halves: u32,
-    /// Modulation index at which it is the best of what many starts find, in steps of a hundredth.
+    /// Modulation index at which it is the best of the optima found from many starts, in steps of a hundredth.
     pub anchor: u32,
     /// First and last modulation index, in hundredths.
     pub window: (u32, u32),
-    /// Carrier half, counted from 0°, at whose beginning the flux lies next to its fundamental: there the pattern takes over from a free
-    /// carrier.
+    /// Carrier half, counted from 0°, at whose beginning the flux is closest to its fundamental: there the pattern takes over from a free carrier.
     pub calm: u32,
-    /// The place among the branches of as many pulses, from the smallest modulation index up.
+    /// Index among the branches with the same number of pulses, from the smallest modulation index up.
     pub place: u32,
-    /// Highest stator frequency at which it is used, in Hz: makes an angle of the shortest pulse.
+    /// Highest stator frequency at which it is used, in Hz: it turns the shortest pulse into an angle.
     pub highest_hz: f64,
 }
 
@@ -80,7 +79,7 @@ impl Branch {
     /// The branch from one end of its window to the other.
     ///
     /// # Errors
-    /// Where it has no optimum.
+    /// If it has no optimum.
     pub fn followed(&self) -> Result<Followed, String> {
         let lost = |at: u32| format!("{}: no optimum at modulation index {:.2}", self.name, index(at));
         let start = self.best_at_anchor().ok_or_else(|| lost(self.anchor))?;
@@ -129,14 +128,14 @@ impl Branch {
         held.min_by(|a, b| cost(a).total_cmp(&cost(b)))
     }
 
-    /// The carrier half in which each angle lies, less half the shortest pulse at its ends; `None` where two edges of a phase lie in one half.
+    /// The carrier half in which each angle lies, reduced by half the shortest pulse at both ends; `None` if two edges of a phase lie in one half.
     fn bounds(&self, angles: &[f64]) -> Option<Vec<(f64, f64)>> {
         let width = FRAC_PI_2 / f64::from(3 * self.halves);
         let room = 0.5 * self.shortest_rad();
         let cells: Vec<_> = angles.iter().map(|angle| (angle / width).floor()).collect();
         let bounds: Vec<_> =
             cells.iter().map(|cell| (cell * width + room, (cell + 1.0) * width - room)).collect();
-        // The edge at angle 0 is one, too; beyond its own half every edge is far enough from it.
+        // The edge at angle 0 is one, too; outside its own half every edge is far enough from it.
         let first = angles[0] >= 2.0 * room;
         let single = cells.windows(2).all(|pair| pair[0] < pair[1]);
         (first && single).then_some(bounds)
@@ -148,7 +147,7 @@ fn index(hundredths: u32) -> f64 {
     f64::from(hundredths) * STEP
 }
 
-/// Ascending angles between 0 and 90° of start number `start`, evenly spread in so many dimensions by an additive recurrence.
+/// Ascending angles between 0 and 90° of start number `start`, spread evenly in `count` dimensions by an additive recurrence.
 fn spread(start: u32, count: usize) -> Vec<f64> {
     // The positive root of x^(count + 1) = x + 1.
     let root = (0..64).fold(1.5, |root: f64, _| libm::pow(1.0 + root, 1.0 / (count as f64 + 1.0)));

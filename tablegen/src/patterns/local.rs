@@ -5,10 +5,10 @@ use slsqp::{Func, StopTols, minimize};
 
 /// Scale of the cost, which is small: the optimiser's tolerances suit values near one.
 const SCALE: f64 = 1e3;
-/// Evaluations at most, and the relative change of cost at which it ends.
+/// Most evaluations, and the relative change of cost at which the search ends.
 const MOST_EVALUATIONS: usize = 100;
 const TOLERANCE: f64 = 1e-10;
-/// Fundamental by which an optimum may be off before Newton's steps make it exact, and how many of these.
+/// Deviation of the fundamental up to which Newton's steps can make an optimum exact, and the number of these steps.
 const NEAR: f64 = 1e-4;
 const NEWTON_STEPS: usize = 4;
 
@@ -22,19 +22,19 @@ pub(super) struct Problem<'a> {
     pub shortest_rad: f64,
     /// Least and largest value of each angle, in rad.
     pub bounds: &'a [(f64, f64)],
-    /// Cost beside the square of the distortion, if there is any.
+    /// Cost in addition to the square of the distortion, if there is any.
     pub beside: Option<&'a dyn Fn(&Waveform) -> f64>,
 }
 
-/// Step of an angle by which the slope of what counts beside it is found, in rad.
+/// Step of an angle by which the slope of the additional cost is found, in rad.
 const SLOPE_STEP: f64 = 1e-6;
 
-/// By how much a start beside another problem's optimum is off it in each angle, in rad.
+/// Offset in each angle of a start near another problem's optimum, in rad.
 const BESIDE: f64 = 0.01;
 
 impl Problem<'_> {
-    /// The optimum that is reached from that of the distortion alone. Right there the search often ends at once, so it begins
-    /// beside it, too: the better one counts.
+    /// The optimum that is reached from that of the distortion alone. A search from exactly there often ends at once, so a second one begins beside
+    /// it: the better result counts.
     pub fn calmest(&self, start: &[f64]) -> Option<Vec<f64>> {
         let cost = |angles: &Vec<f64>| {
             let wave = Waveform { first: self.first, angles_rad: angles };
@@ -45,7 +45,7 @@ impl Problem<'_> {
         found.min_by(|a, b| cost(a).total_cmp(&cost(b)))
     }
 
-    /// The local optimum that is reached from a start; `None` where there is none, or the constraints do not hold.
+    /// The local optimum that is reached from a start; `None` if there is none, or if the constraints are not met.
     pub fn optimum(&self, start: &[f64]) -> Option<Vec<f64>> {
         let first = self.first;
         let cost = |angles: &[f64], mut slopes: Option<&mut [f64]>, (): &mut ()| {
@@ -69,12 +69,12 @@ impl Problem<'_> {
             start.iter().zip(self.bounds).map(|(angle, (low, high))| angle.clamp(*low, *high)).collect();
         let ends = StopTols { ftol_rel: TOLERANCE, ..StopTols::default() };
         let found = minimize(cost, &start, self.bounds, &constraints, (), MOST_EVALUATIONS, Some(ends));
-        // Near the optimum it may stop for rounding: the constraints decide.
+        // Near the optimum it may stop because of rounding: the constraints decide.
         let (Ok((_, angles, _)) | Err((_, angles, _))) = found;
         self.made_exact(angles)
     }
 
-    /// Negative where they hold: the fundamental neither larger nor smaller, pulses no shorter.
+    /// Negative if they are met: the fundamental neither larger nor smaller, pulses no shorter.
     fn constraints(&self, angles: usize) -> Vec<Box<dyn Func<()>>> {
         let (first, index, shortest) = (self.first, self.index, self.shortest_rad);
         let fundamental = |side: f64| -> Box<dyn Func<()>> {
@@ -98,7 +98,7 @@ impl Problem<'_> {
         [1.0, -1.0].map(fundamental).into_iter().chain((0..angles - 1).map(pulse)).collect()
     }
 
-    /// The angles moved along the fundamental's slope until it is exact, if all bounds hold then.
+    /// The angles moved along the fundamental's slope until it is exact, if all bounds are then met.
     fn made_exact(&self, mut angles: Vec<f64>) -> Option<Vec<f64>> {
         let missing =
             |angles: &[f64]| self.index - Waveform { first: self.first, angles_rad: angles }.fundamental();

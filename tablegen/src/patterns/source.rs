@@ -1,10 +1,10 @@
-//! The angles as Rust, for the modulator.
+//! The angles as Rust source, for the modulator.
 
 use super::branch::STEP;
 use super::{Followed, Waveform};
 use std::fmt::Write as _;
 
-/// The source of the table of angles: one `Branch` each, named by the branch in capitals.
+/// The source of the table of angles: one `Branch` for each, named by the branch in capitals.
 pub fn angle_table(branches: &[Followed]) -> String {
     let mut out = String::from(
         "//! The angles of the optimised patterns, in rad, from node to node of the modulation index. Made by `cargo rig patterns --write`.\n#![allow(clippy::excessive_precision, clippy::unreadable_literal)]\n\nuse super::Branch;\n",
@@ -51,7 +51,7 @@ pub static {name}: Branch = Branch {{
     out
 }
 
-/// The weighted distortion as a square function of the share of six-step that the fundamental lacks, by least squares.
+/// The weighted distortion, fitted by least squares as a quadratic function of the share of six-step that the fundamental lacks.
 fn ripple_fit(followed: &Followed) -> [f64; 3] {
     let (mut matrix, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
     for (index, angles) in &followed.nodes {
@@ -68,8 +68,8 @@ fn ripple_fit(followed: &Followed) -> [f64; 3] {
     solved(matrix, right)
 }
 
-/// The rms value of the ripple flux along the fundamental's, as a share of that, as a linear function of the share of six-step that the fundamental lacks, by least
-/// squares.
+/// The rms value of the ripple flux along the fundamental's, as a share of that, fitted by least squares as a linear function of the share of six-step that the
+/// fundamental lacks.
 fn along_fit(followed: &Followed) -> [f64; 2] {
     let mut sums = [0.0; 5];
     for (index, angles) in &followed.nodes {

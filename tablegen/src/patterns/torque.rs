@@ -6,12 +6,12 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
 /// The direction in which ripple flux makes torque, ahead of the fundamental's voltage, in rad: −46° to −47° at the reference machine's largest
 /// torque on its MTPA curve, at any speed, by its flux map's incremental inductances.
 const AHEAD_RAD: f64 = -0.81;
-/// The weight of the torque's peaks beside the distortion: the distortion becomes larger by 1.4 % at most.
+/// The weight of the torque's peaks relative to the distortion: it increases the distortion by 1.4 % at most.
 const WEIGHT: f64 = 0.4;
-/// Harmonics of the torque, six a turn each, that count, and instants of a sixth of a turn.
+/// Number of the torque's harmonics that count, six a turn each, and of instants in a sixth of a turn.
 const HARMONICS: usize = 20;
 const INSTANTS: usize = 64;
-/// The exponent of the mean: near the largest value, and smooth.
+/// The exponent of the mean, which is close to the largest value, but smooth.
 const EXPONENT: i32 = 8;
 
 /// The waves of the torque's harmonics at the instants.

@@ -2,10 +2,10 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-/// The highest harmonic that counts: those above it hold less than a ten-thousandth of the weighted distortion.
+/// The highest harmonic that counts: those above it make less than a ten-thousandth of the weighted distortion.
 const LAST_HARMONIC: u32 = 997;
 
-/// One phase's voltage: at `first` of both levels from angle 0, changing at each of the angles and mirrored at 90°.
+/// One phase's voltage: it starts at the level `first` at angle 0, changes at each of the angles and is mirrored at 90°.
 #[derive(Clone, Copy, Debug)]
 pub struct Waveform<'a> {
     /// 1 or −1: the level between 0 and the first angle.
@@ -71,7 +71,7 @@ impl Waveform<'_> {
         (1..).map(move |k| (harmonic(6.0 * f64::from(k) - 1.0), harmonic(6.0 * f64::from(k) + 1.0)))
     }
 
-    /// The rms value of the ripple flux along the fundamental's, as a share of that. There harmonics of the orders 6k − 1 and 6k + 1 add.
+    /// The rms value of the ripple flux along the fundamental's, as a share of that. In this direction harmonics of the orders 6k − 1 and 6k + 1 add.
     pub(super) fn along(&self) -> f64 {
         let orders = LAST_HARMONIC as usize / 6;
         let squares =

@@ -1,4 +1,4 @@
-//! The spline's slopes: exact for cubics, and central differences where there are too few values.
+//! The spline's slopes: exact for cubics, and central differences if there are too few values.
 
 use super::*;
 
@@ -35,7 +35,7 @@ fn places_on_an_axis() {
     }
 }
 
-/// A surface of cubics along both axes, with its slopes, within the grid; beyond it the edge's tangent.
+/// A surface of cubics along both axes, with its slopes, is reproduced within the grid; beyond it the edge's tangent continues.
 #[test]
 fn a_bicubic_surface_is_kept() {
     let along_d =

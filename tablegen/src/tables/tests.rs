@@ -1,4 +1,4 @@
-//! Tables of a machine without saturation, by closed forms.
+//! Tables of a machine without saturation, compared with closed forms.
 
 use super::*;
 use crate::testing::{IPM, Linear, MOST_A, POLE_PAIRS, RESISTANCE_OHM, near};
@@ -65,7 +65,7 @@ fn parameters_of_a_linear_machine_are_constants() {
     }
 }
 
-/// The static inductance along d is the chord from no current along d, beside the axis too; on the axis itself it is the incremental one.
+/// The static inductance along d is the chord from zero d current, also next to the axis; on the axis itself it is the incremental one.
 #[test]
 fn static_inductances_of_a_curved_machine_are_chords() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tables/pmasynrm-180kw");
@@ -83,7 +83,7 @@ fn static_inductances_of_a_curved_machine_are_chords() {
     }
 }
 
-/// A surface that is bilinear itself is read exactly, beyond the grid too.
+/// A surface that is itself bilinear is read exactly, also beyond the grid.
 #[test]
 fn parameters_are_read_between_nodes() {
     let own =
@@ -99,7 +99,7 @@ fn parameters_are_read_between_nodes() {
     }
 }
 
-/// One pass is the closed form with parameters that are constants, within what a line between two nodes of the universal curve is off.
+/// For constant parameters one pass equals the closed form, within the error of a line between two nodes of the universal curve.
 #[test]
 fn two_passes_are_the_best_current() {
     let grid = parameter_grid(&IPM, &Regular { psi_f_wb: 0.01, saliency_h: 0.001 });
@@ -132,7 +132,7 @@ fn best_currents_over_torque() {
         let currents = best.currents();
         assert_eq!(currents.last_torque_nm, best.last_torque_nm());
         assert_eq!(currents.currents_a[60], best.0[60].1);
-        // The trim is what the passes leave.
+        // The trim is the error that the passes leave.
         let grid = parameter_grid(&IPM, &Regular { psi_f_wb: 0.01, saliency_h: 0.001 });
         for (node, (torque_nm, best)) in best.start(&grid, &universal(), FACTOR).iter().zip(&best.0) {
             let passed = grid.two_passes(torque_nm / FACTOR, *best, &universal());
@@ -156,7 +156,7 @@ fn flux_of_a_linear_machine_is_on_its_nodes() {
     }
 }
 
-/// With squares of both currents each node lies a twelfth of their second differences below.
+/// With squares of both currents each node lies lower by a twelfth of their second differences.
 #[test]
 fn flux_of_a_curved_machine_is_right_on_average() {
     let mut map = IPM.folder(&[]).map;
@@ -231,7 +231,7 @@ fn parameters_that_vanish_are_kept_above_zero() {
     }
 }
 
-/// A small part of the saliency at the largest torque is the least that counts: of a linear machine the tables have its own everywhere.
+/// A small part of the saliency at the largest torque is the lower limit: for a linear machine the tables have its own saliency everywhere.
 #[test]
 fn tables_of_a_linear_machine_have_its_saliency() {
     let tables = IPM.folder(&[]).tables();

@@ -1,11 +1,11 @@
-//! Circles of a machine without saturation by closed forms, what is read of them by hand, and lines beside them by brute force.
+//! Circles of a machine without saturation compared with closed forms, values read from them by hand, and lines next to them by brute force.
 
 use super::*;
 use crate::FluxMap;
 use crate::testing::{IPM, Linear, MOST_A, POLE_PAIRS, RESISTANCE_OHM, near};
 
 const FACTOR: f64 = 1.5 * POLE_PAIRS as f64;
-/// Full torque's flux linkage, made up.
+/// Full torque's flux linkage, an invented value.
 const TOP_WB: f64 = 0.25;
 
 fn machine() -> (MachineFolder, SmoothMap) {
@@ -14,7 +14,7 @@ fn machine() -> (MachineFolder, SmoothMap) {
     (machine, smooth)
 }
 
-/// Circles without having been reckoned: nodes and torques that are linear from row to row, and from column to column.
+/// Circles that were not computed: nodes and torques that are linear from row to row, and from column to column.
 fn made_up<'a>(machine: &'a MachineFolder, smooth: &'a SmoothMap) -> Circles<'a> {
     let row = |r: usize| Row {
         torque_nm: 2.0 + 0.25 * r as f64,
@@ -99,7 +99,7 @@ fn excess_is_the_most_of_a_cells_samples() {
 fn what_exceeds_makes_all_its_nodes_narrower() {
     let (machine, smooth) = machine();
     let mut circles = made_up(&machine, &smooth);
-    // No torque: left alone.
+    // No torque: left unchanged.
     circles.rows[0].torque_nm = 0.5 * NO_TORQUE_NM;
     let before = circles.rows.clone();
     let excess: Vec<Vec<_>> =
@@ -162,7 +162,7 @@ fn circles_reach_from_the_least_flux_to_more_than_full_torque_needs() {
     }
 }
 
-/// T = 1.5 n_p (ψ_m + (L_d − L_q) i_d) i_q, at every node; and the flux linkage is the row's wherever less torque does not need less.
+/// T = 1.5 n_p (ψ_m + (L_d − L_q) i_d) i_q, at every node; and the flux linkage is the row's unless less torque needs less.
 #[test]
 fn rows_of_a_linear_machine() {
     let (machine, smooth) = machine();
@@ -193,7 +193,7 @@ fn rows_of_a_linear_machine() {
         on += usize::from((psi_d.hypot(psi_q) / psi_wb - 1.0).abs() < 1e-6);
     }
     assert!(on > 5, "{on}");
-    // Where its own nodes have less than its last.
+    // The case where its own nodes have less than its last.
     let flux: Vec<_> = (0..COLUMNS).map(|c| 0.03 - 0.000_5 * c as f64).collect();
     circles.margins[60] = Margins { flux: flux.clone(), current: 0.0 };
     let row = circles.row(60);
@@ -216,7 +216,7 @@ fn with_map(map: Linear) -> MachineFolder {
     machine
 }
 
-/// Its q axis saturates: at the largest current by 30 %.
+/// Saturates its q axis: at the largest current by 30 %.
 fn saturated(mut machine: MachineFolder) -> MachineFolder {
     let FluxMap { iq_a, psi_q_wb, .. } = &mut machine.map;
     let share = |iq: &f64| 1.0 - 0.3 * (iq / MOST_A).powi(2);
@@ -224,7 +224,7 @@ fn saturated(mut machine: MachineFolder) -> MachineFolder {
     machine
 }
 
-/// A machine that is not done with being made narrower once.
+/// A machine for which making the circles narrower once is not enough.
 #[test]
 fn circles_are_made_anew_until_nothing_exceeds() {
     let mut machine = with_map(Linear { ld_h: 0.002, lq_h: 0.03, psi_m_wb: 0.02 });
@@ -240,7 +240,7 @@ fn circles_are_made_anew_until_nothing_exceeds() {
     assert_eq!(tables.currents.nodes, wanted);
 }
 
-/// A machine whose d axis has the larger inductance, beyond what takes its magnets' flux: its torque would be divided by nothing, or by less.
+/// A machine whose d axis has the larger inductance, beyond the current that cancels its magnets' flux: torque would be divided by zero, or by less.
 #[test]
 fn what_torque_is_divided_by_is_above_zero() {
     let machine = with_map(Linear { ld_h: 0.015, lq_h: 0.006, psi_m_wb: 0.1 });
@@ -251,7 +251,7 @@ fn what_torque_is_divided_by_is_above_zero() {
     near(least, 1e-6 * circles.flux_wb(1.0), 1e-12);
 }
 
-/// A machine of a five-thousandth of the current, which saturates as the larger one does, has the same circles.
+/// A machine with a five-thousandth of the current, which saturates as the larger one does, has the same circles.
 #[test]
 fn the_machines_size_does_not_matter() {
     let row = |size: f64| {
@@ -272,7 +272,7 @@ fn the_machines_size_does_not_matter() {
     }
 }
 
-/// To the same torque on another circle, exactly; or not at all; whatever the machine's size.
+/// Moved to the same torque on another circle, exactly, or not at all, whatever the machine's size.
 #[test]
 fn currents_are_moved_along_their_torque() {
     for size in [1.0, 1e-5] {
@@ -280,7 +280,7 @@ fn currents_are_moved_along_their_torque() {
     }
 }
 
-/// With so many times the flux linkage.
+/// With this many times the flux linkage.
 fn moved_along_their_torque(size: f64) {
     let Linear { ld_h, lq_h, psi_m_wb } = IPM;
     let own = Linear { ld_h: size * ld_h, lq_h: size * lq_h, psi_m_wb: size * psi_m_wb };
@@ -299,7 +299,7 @@ fn moved_along_their_torque(size: f64) {
             near(psi_d.hypot(psi_q), share * from_wb, 1e-11);
         }
         assert_eq!(circles.moved((id, iq), torque_nm, from_wb, from_wb), (id, iq));
-        // It stands on no such circle.
+        // It does not lie on such a circle.
         for share in [1.01, 0.99, 1.000_001] {
             assert_eq!(circles.moved((id, iq), torque_nm, share * from_wb, 0.98 * from_wb), (id, iq));
         }

@@ -1,8 +1,8 @@
-//! The firmware that identifies its machine on the NUCLEO-G474RE: that of the drive with another control law, whose observations it keeps and
-//! tells over CAN.
+//! The firmware that identifies its machine on the NUCLEO-G474RE: the drive's firmware with another control law, whose observations it stores and
+//! reports over CAN.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-/// The image runs on the board; on the host it names the command that brings it there.
+/// On the board the image runs; on the host it prints the command that flashes it.
 #[cfg(not(target_os = "none"))]
 fn main() {
     println!("This is the firmware. `cargo xtask flash --identify` builds it for its board and flashes it.");
@@ -36,14 +36,14 @@ mod firmware {
     static MEMORY: Memory = Memory::new();
     static UNITS: Units = Units::of(&BUILT_IN.ratings);
 
-    /// Nothing compensates the dead time: the host counts the pulses as they are commanded.
+    /// The dead time is not compensated: the host accounts for the pulses as they are commanded.
     const fn settings() -> Settings {
         let drive = POWER_STAGE.settings(&BUILT_IN.ratings);
         let devices = SwitchLimits { dead_time_ticks: 0, ..drive.devices };
         Settings { devices, gains: Gains::of(true, false), ..drive }
     }
 
-    // The build script has said so already, by name: a machine with which the drive would not start makes no image.
+    // The build script has already reported this by name: no image is built for a machine with which the drive would not start.
     const _: () = assert!(settings().check(&BUILT_IN).is_ok());
 
     #[entry]
@@ -51,7 +51,7 @@ mod firmware {
         board::idle_over(Identifying::new(CanEndpoint::new(&BUILT_IN.ratings), &MEMORY), start().err())
     }
 
-    /// Starts the drive; the error is why it is refused.
+    /// Starts the drive; the error says why the start is refused.
     fn start() -> Result<(), FailedCheck> {
         let found = board::prepare(settings().devices).map_err(|error| error.failed())?;
         CONTROL_ZEROS.keep(found.control_zeros);
@@ -60,7 +60,7 @@ mod firmware {
         Ok(())
     }
 
-    /// Deadline: the next control interrupt. Missed: fault `control_deadline`, gates into the safe state.
+    /// Deadline: the next control interrupt. If missed: fault `control_deadline`, gates into the safe state.
     #[interrupt]
     fn TIM3() {
         static mut BOARD: Option<Control<'static, Sensor>> = None;
@@ -79,7 +79,7 @@ mod firmware {
         nucleo_g474re::complete_stores();
     }
 
-    /// Deadline: the next carrier boundary, where the shadow registers take over. Missed: a break, gates off for good.
+    /// Deadline: the next carrier boundary, where the shadow registers take over. If missed: a break, gates off for good.
     #[interrupt]
     fn TIM1_UP_TIM16() {
         static mut BOARD: Option<Pwm> = None;

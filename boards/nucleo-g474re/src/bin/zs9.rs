@@ -1,7 +1,7 @@
 //! The ZS9 firmware on the NUCLEO-G474RE: two interrupts and an idle loop, nothing else.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-/// The image runs on the board; on the host it names the command that brings it there.
+/// On the board the image runs; on the host it prints the command that flashes it.
 #[cfg(not(target_os = "none"))]
 fn main() {
     println!(
@@ -28,7 +28,7 @@ mod firmware {
     /// The zeros that the start measured, written before the interrupts are unmasked.
     static ZEROS: [AtomicU32; 7] = [const { AtomicU32::new(0) }; 7];
 
-    // The build script has said so already, by name: a machine with which the drive would not start makes no image.
+    // The build script has already reported this by name: no image is built for a machine with which the drive would not start.
     const _: () = assert!(settings().check(&BUILT_IN).is_ok());
 
     fn keep(zeros: &Zeros) {
@@ -44,8 +44,8 @@ mod firmware {
         Zeros { motors: [[u1, v1, w1], [u2, v2, w2]], inductor }
     }
 
-    // The interrupts' code, word by word from the flash memory to the CCM SRAM (`ccm.x`). The runtime calls it first of all, before there are variables:
-    // therefore not in Rust.
+    // Copies the interrupts' code word by word from the flash memory to the CCM SRAM (`ccm.x`). The runtime calls this before anything else, when
+    // variables do not exist yet: therefore it is not in Rust.
     global_asm!(
         ".section .text.__pre_init, \"ax\"",
         ".global __pre_init",
@@ -69,14 +69,14 @@ mod firmware {
         board::idle(start().err())
     }
 
-    /// Starts the drive; the error is why it is refused.
+    /// Starts the drive; the error says why the start is refused.
     fn start() -> Result<(), FailedCheck> {
         keep(&board::prepare().map_err(|error| error.failed())?);
         board::run();
         Ok(())
     }
 
-    /// Deadline: the last peak before the next control interrupt. Missed: fault `control_deadline`, all gates off.
+    /// Deadline: the last peak before the next control interrupt. If missed: fault `control_deadline`, all gates off.
     #[interrupt]
     fn TIM2() {
         static mut BOARD: Option<Control<'static, Encoder>> = None;
@@ -96,8 +96,8 @@ mod firmware {
         nucleo_g474re::complete_stores();
     }
 
-    /// Comes at peaks and valleys; only the peaks are the drive's. Deadline: the next valley, where the shadow registers take
-    /// over. Missed: a break, gates off for good.
+    /// Comes at peaks and valleys; the drive uses only the peaks. Deadline: the next valley, where the shadow registers take over. If missed: a
+    /// break, gates off for good.
     #[interrupt]
     fn TIM1_UP_TIM16() {
         static mut BOARD: Option<Pwm> = None;

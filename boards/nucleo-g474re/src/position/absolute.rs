@@ -1,13 +1,12 @@
-//! An absolute encoder that shifts its position out, SSI, read by SPI1.
+//! An absolute encoder with a serial interface, SSI, read by SPI1.
 //!
-//! At the first falling edge of the clock the encoder holds its position, at each rising edge it puts out a bit, the most significant one
-//! first, and after the last one the line stays low until the encoder has had 20 µs without a clock. A frame is 32 clocks at 1.33 MHz, each bit
-//! taken at the falling edge behind the one that put it out: the line as it rests, high; the position; low. A wire that is open, shorted or
-//! exchanged shows in the bit before or the bit behind; SSI has no checksum, and a bit that is wrong in between is an angle that jumps,
-//! which the drive finds as `angle_lost`.
+//! At the first falling edge of the clock the encoder latches its position. At each rising edge it puts out a bit, the most significant one first,
+//! and after the last one the line stays low until the encoder has had 20 µs without a clock. A frame is 32 clocks at 1.33 MHz; each bit is read at
+//! the falling edge after the one that put it out: the line at rest, high; the position; low. An open, shorted or swapped wire shows in the bit
+//! before or the bit after. SSI has no checksum: a wrong bit in between makes the angle jump, which the drive detects as `angle_lost`.
 //!
-//! The control interrupt takes the frame that it began a period ago and begins the next one. So an angle is one period old, which the power
-//! stage tells the drive, and off by as much as the rotor turns while a PWM interrupt delays it: 1.5 µs, 0.2° at 6,000 r/min with four pole pairs.
+//! The control interrupt takes the frame that it began a period ago and begins the next one. So the angle is one period old, which the power stage
+//! tells the drive, and its error is the rotor's turn while a PWM interrupt delays it: 1.5 µs, 0.2° at 6,000 r/min with four pole pairs.
 
 use super::Position;
 use crate::pins::{Function, Pin, Port, pin};
@@ -18,7 +17,7 @@ use stm32_metapac::spi::{Spi, vals};
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
 
-/// An encoder of so many bits in a turn, in Gray's code or in plain binary numbers.
+/// An encoder with so many bits per turn, in Gray code or in plain binary.
 #[derive(Clone, Copy)]
 pub struct Absolute<const BITS: u32, const GRAY: bool> {
     spi: Spi,
@@ -32,7 +31,7 @@ impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
         pin(Port::B, 4, Function::Alternate(5), &["SPI1_MISO"], "absolute encoder, data"),
     ];
 
-    /// Master, two words of 16 bits a frame, the clock high at rest, at 170 MHz / 128; bits are taken at its falling edges.
+    /// Master, two words of 16 bits a frame, clock high at rest, at 170 MHz / 128; bits are read at its falling edges.
     fn prepare(registers: &Registers, _stage: &PowerStage, wait: &mut dyn Wait) -> Result<(), StartError> {
         registers.rcc.apb2enr().modify(|w| w.set_spi1en(true));
         wait.microseconds(1);
@@ -53,21 +52,21 @@ impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
         Self { spi: registers.spi1, pole_pairs: ratings.pole_pairs as u32, zero: stage.encoder_zero }
     }
 
-    /// None where the frame has not come, or not as a frame is.
+    /// `None` if no frame has come, or an invalid one.
     #[inline]
     fn angle(&mut self) -> Option<Angle> {
         let frame = self.take();
         self.spi.dr16().write_value(0);
         self.spi.dr16().write_value(0);
         let position = decoded(frame, BITS, GRAY)?;
-        // The middle of a step, not where it begins.
+        // The middle of a step, not its beginning.
         let turn = (position << (32 - BITS)) | (1 << (31 - BITS));
         Some(Angle(turn.wrapping_mul(self.pole_pairs)) + self.zero)
     }
 }
 
 impl<const BITS: u32, const GRAY: bool> Absolute<BITS, GRAY> {
-    /// The bits that came of a frame's two words. Without both of them its first bit is low, which is no frame.
+    /// The bits received in a frame's two words. If a word is missing the first bit is low, which is no valid frame.
     #[inline]
     fn take(&self) -> u32 {
         let came = |frame| match self.spi.sr().read().rxne() {
@@ -78,7 +77,7 @@ impl<const BITS: u32, const GRAY: bool> Absolute<BITS, GRAY> {
     }
 }
 
-/// The position in a frame; `None` if the line was not high before or not low behind it.
+/// The position in a frame; `None` if the line was not high before it or not low after it.
 #[inline]
 pub fn decoded(frame: u32, bits: u32, gray: bool) -> Option<u32> {
     let rested = frame >> 31 == 1;
@@ -88,7 +87,7 @@ pub fn decoded(frame: u32, bits: u32, gray: bool) -> Option<u32> {
     (rested && ended).then_some(plain)
 }
 
-/// The number of a Gray code: each bit by all those above it.
+/// The number that a Gray code stands for: each bit is combined with all those above it.
 #[inline]
 fn of_gray(code: u32) -> u32 {
     [1, 2, 4, 8, 16].iter().fold(code, |code, shift| code ^ code >> shift)

@@ -1,8 +1,8 @@
 //! An incremental encoder with an index.
 //!
-//! The encoder's count is captured by hardware at the control timer's update, the instant at which the currents are sampled: channel 3 of the
-//! encoder's timer captures the internal trigger TRC, which TS selects; the encoder mode leaves TS free (RM0440, general-purpose timers:
-//! encoder interface, "latching the counter value into a third input capture register", and TIMx_CCMR2.CC3S = 11).
+//! Hardware captures the encoder's count at the control timer's update, the instant at which the currents are sampled: channel 3 of the encoder's
+//! timer captures the internal trigger TRC, which TS selects; the encoder mode leaves TS free (RM0440, general-purpose timers: encoder interface,
+//! "latching the counter value into a third input capture register", and TIMx_CCMR2.CC3S = 11).
 
 use super::Position;
 use crate::pins::{Function, Pin, Port, pin};
@@ -22,21 +22,21 @@ pub struct Encoder {
     units_per_count: u32,
     counts: u32,
     zero: Angle,
-    /// Count of the last call and counts since the one before, once the index has passed.
+    /// Count at the last call and counts since the one before, once the index has passed.
     last: Option<(u32, u32)>,
-    /// The last call has seen the index. Its count may be older than that: the next one is not.
+    /// `true` if the last call has seen the index. Its count may be older than the index: the next one is not.
     passed: bool,
     lost: bool,
     /// Before the index: the counted angle, and its change in the last call.
     counted: Angle,
     moved: Angle,
-    /// The angle where the count is 0, as somebody has found it before the index.
+    /// The angle at count 0, if it was found before the index.
     found: Option<Angle>,
-    /// The rest of that one's error, behind the index.
+    /// The rest of the error of that angle, after the index.
     left: Angle,
 }
 
-/// Share of that error that is left after each call, as a number of bits: the angle mends in some hundreds of calls, without a step.
+/// Share of that error that is left after each call, as a number of bits: the angle is corrected over some hundreds of calls, without a step.
 const MENDING_BITS: u32 = 7;
 
 /// The channel that captures the count, from 0.
@@ -59,7 +59,7 @@ impl Encoder {
             timer,
             units_per_count,
             counts: stage.encoder_counts.max(1),
-            // The middle of a count, not where it begins.
+            // The middle of a count, not its beginning.
             zero: stage.encoder_zero + Angle(units_per_count / 2),
             last: None,
             passed: false,
@@ -71,8 +71,8 @@ impl Encoder {
         }
     }
 
-    /// Counts every edge of both tracks, 0 ..= counts − 1 a turn; the index sets it to 0 in either direction. Each `trigger`, the control
-    /// timer's TRGO, captures the count.
+    /// Counts every edge of both tracks, 0 ..= counts − 1 per turn; the index sets it to 0 in either direction. Each `trigger`, the control timer's
+    /// TRGO, captures the count.
     pub fn configure(timer: TimGp16, stage: &PowerStage, trigger: vals::Ts) {
         timer.ccmr_input(0).write(|w| {
             for channel in [0, 1] {
@@ -82,7 +82,7 @@ impl Encoder {
         });
         timer.ccmr_input(1).write(|w| w.set_ccs(0, vals::CcmrInputCcs::TRC));
         timer.arr().write(|w| w.set_arr((stage.encoder_counts - 1) as u16));
-        // TS changes only while no mode uses it.
+        // TS may change only while no mode uses it.
         timer.smcr().write(|w| w.set_ts(trigger));
         timer.smcr().modify(|w| {
             w.set_sms(vals::Sms::ENCODER_MODE_3);
@@ -110,15 +110,15 @@ impl Position for Encoder {
         Self::new(registers.tim4, stage, ratings)
     }
 
-    /// Known from the second call after the index on: the flag is read, not captured, and an index between the capture and the
-    /// reading is in the next count. Called every control period: each further index must find the count where the speed lets it
-    /// be expected, else counts were lost or invented on the way, and the angle is lost for good.
+    /// Known from the second call after the index on: the flag is read, not captured, so an index between the capture and the reading shows in the
+    /// next count. Called every control period: each further index must come at a count that the speed makes possible; otherwise counts were lost
+    /// or added, and the angle is lost for good.
     #[inline]
     fn angle(&mut self) -> Option<Angle> {
         let index = self.timer.sr().read().idxif();
         let count = u32::from(self.timer.ccr(CAPTURE).read().ccr());
         if index {
-            // Status flags are cleared by writing 0 and left alone by writing 1.
+            // Status flags are cleared by writing 0; writing 1 leaves them alone.
             let mut all_but_index = regs::SrGp16(u32::MAX);
             all_but_index.set_idxif(false);
             self.timer.sr().write_value(all_but_index);
@@ -164,8 +164,8 @@ impl Position for Encoder {
 }
 
 impl Encoder {
-    /// The angle before the index, where somebody has found it. A count with the index's flag may be from before or behind it: there the rotor
-    /// is taken to have turned on.
+    /// The angle before the index, if it has been found. A count that comes with the index flag may be from before or after the index: then the rotor
+    /// is assumed to have turned on.
     #[cold]
     fn before_index(&mut self, turned: Angle, index: bool) -> Option<Angle> {
         if !index {
@@ -175,14 +175,14 @@ impl Encoder {
         self.found.map(|found| self.counted + found)
     }
 
-    /// Less than a turn, from less than two.
+    /// Reduces a count of less than two turns to less than one.
     #[inline]
     fn wrapped(&self, counts: u32) -> u32 {
         if counts >= self.counts { counts - self.counts } else { counts }
     }
 }
 
-/// Electrical angle units of one count, rounded; over a turn the rounding is 2⁻¹⁷ of a turn at most.
+/// Electrical angle units per count, rounded; over a turn the rounding error is 2⁻¹⁷ of a turn at most.
 fn units_per_count(counts: u32, pole_pairs: u32) -> u32 {
     let turns = u64::from(pole_pairs) << 32;
     let counts = u64::from(counts.max(1));
@@ -199,7 +199,7 @@ mod tests {
         let units = units_per_count(10_000, 3);
         let error = (u64::from(units) * 10_000).abs_diff(3 << 32);
         assert!(error <= 5_000, "{error}");
-        // 429,496.7296: to the nearest.
+        // 429,496.7296: rounded to the nearest.
         assert_eq!(units_per_count(10_000, 1), 429_497);
     }
 }

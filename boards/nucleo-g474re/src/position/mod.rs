@@ -16,21 +16,21 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
 
-// The sensor that the power stage's file names: a type that the build script writes.
+// The sensor that the power stage's file names: the build script writes its type.
 include!(concat!(env!("OUT_DIR"), "/position.rs"));
 
-/// A source of the electrical angle. The power stage's file says which one the image has.
+/// A source of the electrical angle. The power stage's file says which one the image contains.
 pub trait Position: Sized {
-    /// Its pins, beside those of [`PINS`](crate::pins::PINS).
+    /// Its pins, in addition to those of [`PINS`](crate::pins::PINS).
     const PINS: &'static [Pin];
 
-    /// Configures what it needs, before the timers run.
+    /// Configures what the sensor needs, before the timers run.
     ///
     /// # Errors
-    /// A converter that does not come up.
+    /// If a converter does not come up.
     fn prepare(registers: &Registers, stage: &PowerStage, wait: &mut dyn Wait) -> Result<(), StartError>;
 
-    /// Begins once the timers run: what they trigger.
+    /// Starts, once the timers run, what they trigger.
     fn follow(_registers: &Registers, _wait: &mut dyn Wait) {}
 
     /// The sensor on the shaft of a machine of these ratings.
@@ -44,16 +44,16 @@ pub trait Position: Sized {
         false
     }
 
-    /// Turn since the sensor began to count, electrical, at the newest [`Position::angle`], where that is not known; `None` where nothing counts.
+    /// Electrical turn since the sensor began to count, at the newest [`Position::angle`], while the angle is not known; `None` if nothing counts.
     fn counted(&self) -> Option<Angle> {
         None
     }
 
-    /// Takes the electrical angle that the rotor had where the sensor began to count: the angle is known from now on.
+    /// Takes the electrical angle that the rotor had when the sensor began to count: the angle is known from now on.
     fn align(&mut self, _zero: Angle) {}
 }
 
-/// The state of a drive's position sensors, one word from the control interrupt, which reads them, to the idle loop.
+/// The state of a drive's position sensors: one word from the control interrupt, which reads them, to the idle loop.
 #[derive(Debug)]
 pub struct PositionState(AtomicU32);
 
@@ -67,7 +67,8 @@ impl PositionState {
         Self(AtomicU32::new(0))
     }
 
-    /// In the control interrupt: the angles that its sensors gave, whether each has lost its rotor, and whether the drive can find the angles.
+    /// Called in the control interrupt: the angles that the sensors gave, `true` for each that has lost its rotor, and `true` if the drive can find the
+    /// angles.
     #[inline]
     pub(super) fn tell<const N: usize>(&self, angles: &[Option<Angle>; N], lost: &[bool; N], counted: bool) {
         let counted = if counted { Self::COUNTED } else { 0 };
@@ -76,7 +77,7 @@ impl PositionState {
         self.0.store(known | lost | counted, Ordering::Relaxed);
     }
 
-    /// `true` while an angle is not known that the drive can find.
+    /// `true` while an angle is unknown that the drive can find.
     pub fn is_counted(&self) -> bool {
         self.0.load(Ordering::Relaxed) & Self::COUNTED != 0
     }
@@ -92,7 +93,7 @@ impl PositionState {
     }
 }
 
-/// An angle as the drive is told of it: none where the sensor has lost its rotor.
+/// The angle that the drive is given: `None` if the sensor has lost its rotor.
 #[inline]
 pub(super) fn reported(angle: Option<Angle>, lost: bool) -> Option<Angle> {
     if lost { None } else { angle }

@@ -1,13 +1,13 @@
 //! A resolver, excited by the control timer and read by two converters.
 //!
-//! TIM3's channel 2 toggles its pin once a control period: a square wave of half the control rate, in step with the samples. An amplifier with a
-//! low-pass filter makes the resolver's excitation of it; the pin toggles so much earlier than midway between two samples that, behind the lag of
-//! filter and resolver, the windings' voltages are sampled at their peaks, sine by ADC3 and cosine by ADC5 at the same instant. The
-//! difference of two samples, which stand on peaks of opposite sign, is twice the winding's amplitude without the converters' offsets, and half a
-//! period old, which the power stage tells the drive.
+//! TIM3's channel 2 toggles its pin once a control period: a square wave at half the control rate, in step with the samples. An amplifier with a
+//! low-pass filter turns it into the resolver's excitation. The pin toggles so much earlier than midway between two samples that, after the lag of
+//! filter and resolver, the windings' voltages are sampled at their peaks, sine by ADC3 and cosine by ADC5 at the same instant. The difference of two
+//! samples, taken at peaks of opposite sign, is twice the winding's amplitude without the converters' offsets, and half a period old, which the power
+//! stage tells the drive.
 //!
-//! The amplitude of both windings together is known: without excitation, or with one of them shorted while the other gives less than 70 %, it is
-//! too small, and there is no angle. Wires that are open have to be pulled beyond the converters' range by the board that they come to.
+//! The combined amplitude of both windings is known. Without excitation, or with one of them shorted while the other gives less than 70 %, it is too
+//! small, and there is no angle. The board that the wires come to has to pull open wires beyond the converters' range.
 
 use super::Position;
 use crate::pins::{Function, Pin, Port, is_high, pin};
@@ -30,7 +30,7 @@ const fn sequence(channel: u8) -> Sequence {
 /// Codes that a sound winding's voltage never reaches.
 const RAIL: u16 = 32;
 const TOP: u16 = 4_095 - RAIL;
-/// Amplitude of both windings over what it should be.
+/// Least amplitude of both windings, as a share of the nominal one.
 const LEAST: f32 = 0.7;
 const MOST: f32 = 1.3;
 
@@ -76,7 +76,7 @@ impl<const TURNS: u32, const AMPLITUDE: u16, const TOGGLE_TICKS: u16> Position
         Self { sine, cosine, port: registers.gpiob, zero: stage.encoder_zero, last: None }
     }
 
-    /// None at the first sample, and where there is no excitation, or a wire is open.
+    /// `None` at the first sample, and if there is no excitation or a wire is open.
     #[inline]
     fn angle(&mut self) -> Option<Angle> {
         let positive = is_high(self.port, EXCITATION);
@@ -102,7 +102,7 @@ const fn samplers(registers: &Registers) -> [Sampler; 2] {
     ]
 }
 
-/// A winding's code; none of a converter that gave none, or at an end of its range.
+/// A winding's code; `None` if the converter gave none, or is at an end of its range.
 #[inline]
 fn code(sampler: &Sampler) -> Option<i32> {
     let [first, ..] = sampler.read()?;

@@ -1,4 +1,4 @@
-//! The nine gates: TIM1, TIM8 and TIM20, one a leg.
+//! The nine gates: TIM1, TIM8 and TIM20, one timer per leg.
 //!
 //! # How a period is played
 //! Each timer counts from 0 at the carrier's valley up to the peak and down again. A leg's gates are its channels' outputs:
@@ -9,28 +9,28 @@
 //! | L | 2 | PWM mode 2: on while `CNT >= CCR2` |
 //! | M | 3, which 4 lends its compare | combined PWM: on while `CNT < CCR3` or `CNT >= CCR4` |
 //!
-//! Counting down, the same compares give the mirror image. So a period is nothing but compares; all are preloaded. The PWM
-//! interrupt writes at the peak; they take over at the valley. The update event comes at both, but between valley and peak
-//! nothing is written; an interrupt that ends after the valley turns the gates off for good.
+//! When the timer counts down, the same compares give the mirror image. So a period consists of compares only; all are preloaded. The PWM interrupt
+//! writes them at the peak; they take effect at the valley. The update event comes at both, but nothing is written between valley and peak; an
+//! interrupt that ends after the valley turns the gates off for good.
 //!
 //! # Dead time and shoot-through
-//! The three gates of a leg have no complementary relation, so the dead-time generators serve another way: each of the
-//! channels drives its output **and** its complementary one, which has no pin. With both enabled the generator delays every
-//! rising edge of the output, and leaves the falling ones alone. So
+//! The three gates of a leg have no complementary relation, so the dead-time generators are used differently: each of the channels drives its output
+//! **and** its complementary one, which has no pin. With both enabled the generator delays every rising edge of the output, and leaves the falling
+//! ones alone. Therefore
 //!
-//! * a device is on only while its compares say so, whatever happens: the three of a leg conduct together only within the
-//!   shoot-through that is played, and never beyond it;
-//! * where one device of a leg goes off and another one on, all conduct the dead time later;
-//! * each shoot-through, which begins where a device goes on, is shorter by the dead time, and none if that is all of it. The link's
-//!   control, which has an integral part, makes up for it with its duty;
-//! * a pulse shorter than the dead time is none. A leg that has only such around a valley or a peak hangs on its diodes for at most four
-//!   dead times.
+//! * a device is on only while its compares say so, whatever happens: the three devices of a leg conduct together only within the shoot-through that
+//!   is played, and never beyond it;
+//! * if one device of a leg goes off and another one on, all conduct the dead time later;
+//! * each shoot-through begins where a device goes on, so it is shorter by the dead time, and vanishes if it is no longer than that. The link's
+//!   control, which has an integral part, compensates for it with its duty;
+//! * a pulse shorter than the dead time is suppressed. A leg that has only such pulses around a valley or a peak conducts through its diodes for at
+//!   most four dead times.
 //!
-//! Dead time, breaks and off levels are locked before any pin is a timer's.
+//! Dead time, breaks and off levels are locked before any pin is connected to a timer.
 //!
 //! # The three timers
-//! They are started by one event, count the same clock and have one period for good, so they cannot drift apart. TIM8 and TIM20
-//! follow TIM1 by the few cycles of the trigger's synchroniser. What the dead time protects lies within one leg, hence one timer.
+//! They are started by one event, count the same clock and always have the same period, so they cannot drift apart. TIM8 and TIM20 follow TIM1 by the
+//! few cycles of the trigger's synchroniser. The devices that the dead time separates belong to one leg, hence to one timer.
 
 use super::HALF_CYCLES;
 use super::period::{LegCompares, PeriodCompares};
@@ -38,15 +38,15 @@ use crate::dead_time::DeadTime;
 use crate::outputs::{BreakSources, Outputs};
 use stm32_metapac::timer::{TimAdv, regs, vals};
 
-/// Comparators that break: six of the currents, and one of the gate drivers' ready line, for TIM20's sake.
+/// Comparators that trigger a break: six for the currents, and one for the gate drivers' ready line, because of TIM20.
 pub const BREAKING: [usize; 7] = [1, 2, 3, 4, 5, 6, 7];
 
-/// The place of the carrier.
+/// The position within the carrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Beat {
-    /// The counters have begun to go down.
+    /// The counters have begun to count down.
     Peak,
-    /// The counters have begun to go up.
+    /// The counters have begun to count up.
     Valley,
 }
 
@@ -58,8 +58,8 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// Everything but what makes the timers count: outputs off, all gates off. Call it once after a reset: it ends with the
-    /// write that locks dead time, break and polarities.
+    /// Configures everything except the start of counting: outputs off, all gates off. Call it once after a reset: its last write locks dead time,
+    /// break and polarities.
     pub fn configure(&self, dead_time: DeadTime) {
         for timer in self.timers {
             timer.cr1().write(|w| {
@@ -89,7 +89,7 @@ impl Bridge {
             w.set_mms2(vals::Mms2::UPDATE);
         });
         for timer in followers {
-            // What is preloaded takes over now: no update comes with the start.
+            // The preloaded values take effect now: the start does not cause an update.
             timer.egr().write(|w| w.set_ug(true));
             timer.smcr().write(|w| {
                 w.set_ts(vals::Ts::ITR0);
@@ -107,7 +107,7 @@ impl Bridge {
         Outputs(self.timers)
     }
 
-    /// Starts to count: TIM1's update by software starts whoever waits for its TRGO.
+    /// Starts counting: TIM1's update by software starts every timer that waits for its TRGO.
     pub fn start(&self) {
         let [first, ..] = self.timers;
         first.dier().write(|w| w.set_uie(true));
@@ -130,7 +130,7 @@ impl Bridge {
     #[inline]
     pub fn acknowledge(&self) {
         let [first, ..] = self.timers;
-        // Status flags are cleared by writing 0 and left alone by writing 1.
+        // Status flags are cleared by writing 0; writing 1 leaves them alone.
         first.sr().write_value(regs::SrAdv(!1));
     }
 

@@ -26,7 +26,7 @@ pub static SHARED: Shared = Shared::recorded_by(&RECORDER);
 /// The position sensors' state.
 pub static POSITION: PositionState = PositionState::new();
 
-/// Configures everything, gates off. Call it once.
+/// Configures everything with the gates off. Call it once.
 pub fn prepare() -> Result<Zeros, StartError> {
     let found = start::prepare(&Registers::CHIP, &mut Cycles);
     join_bus(found, &TO_ZS9, &pins::PINS)
@@ -37,8 +37,8 @@ pub fn run() {
     run_with(Interrupt::TIM1_UP_TIM16, Interrupt::TIM2, start::run);
 }
 
-/// The idle loop, forever: serves the bus and the operator, feeds the watchdog, tells what has changed, and after a fault what the
-/// flight recorder holds. Where the start was `refused` it says why to whoever asks on the bus.
+/// The idle loop, which never ends: serves the bus and the operator, feeds the watchdog, logs changes, and after a fault logs the records of the
+/// flight recorder. If the start was `refused`, it reports the reason to whoever asks on the bus.
 pub fn idle(refused: Option<FailedCheck>) -> ! {
     let line =
         Line::rated(&RATINGS, STAGE.common.line.precharge_s, STAGE.common.line.discharge_s).without_chopper();
@@ -59,7 +59,7 @@ pub fn idle(refused: Option<FailedCheck>) -> ! {
     }
 }
 
-/// All outputs off for good, whatever state the program is in, then nothing more; the watchdog resets the chip if it runs.
+/// Turns all outputs off for good, whatever state the program is in, then does nothing more; the watchdog resets the chip if it runs.
 pub fn die() -> ! {
     die_on(&pins::PINS)
 }

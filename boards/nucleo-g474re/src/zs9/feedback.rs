@@ -1,14 +1,14 @@
-//! The gates' real states: two latches a gate on the driver board, read by SPI3 at every peak.
+//! The gates' real states: two latches per gate on the driver board, read by SPI3 at every peak.
 //!
-//! The driver board latches for each gate whether its device has been on and whether it has been off. While the select line is low it
-//! shifts out two words, the most significant bit first, and begins anew when the line goes high:
+//! For each gate the driver board latches whether its device has been on and whether it has been off. While the select line is low it shifts out two words, the
+//! most significant bit first; when the line goes high it starts over:
 //!
 //! | word | bits 15 … 9 | bits 8 … 0 |
 //! |---|---|---|
 //! | first | `1010101` | has been on, bit k gate k |
 //! | second | `0101010` | has been off |
 //!
-//! Other bits on top are a broken wire: then no gate counts as seen, which is a fault as soon as pulses are wanted.
+//! Any other bits on top mean a broken wire: then no gate counts as seen, which is a fault as soon as pulses are wanted.
 
 use stm32_metapac::gpio::Gpio;
 use stm32_metapac::spi::{Spi, vals};
@@ -18,13 +18,13 @@ const GATES: u16 = 0x1FF;
 const FIRST_MARK: u16 = 0b1010101 << 9;
 const SECOND_MARK: u16 = 0b0101010 << 9;
 
-/// Looks at the receive flag before a word counts as missing: several times a word's length.
+/// Polls of the receive flag before a word counts as missing: several times a word's length.
 const PATIENCE: u32 = 100;
 
 /// The select line's number in its port.
 pub const SELECT: usize = 15;
 
-/// The way to the driver board.
+/// The connection to the driver board.
 #[derive(Clone, Copy)]
 pub struct Feedback {
     /// SPI3.
@@ -34,7 +34,7 @@ pub struct Feedback {
 }
 
 impl Feedback {
-    /// Master, 16 bits, 21.25 MHz; nothing is sent to anybody.
+    /// Master, 16 bits, 21.25 MHz; what it sends goes nowhere.
     pub fn configure(&self) {
         self.spi.cr2().write(|w| w.set_ds(vals::Ds::BITS16));
         self.spi.cr1().write(|w| {
@@ -46,7 +46,7 @@ impl Feedback {
         });
     }
 
-    /// First thing at a peak: both words are under way.
+    /// First step at a peak: both words are under way.
     #[inline]
     pub fn begin(&self) {
         self.port.bsrr().write(|w| w.set_br(SELECT, true));
@@ -70,7 +70,7 @@ impl Feedback {
     }
 }
 
-/// The feedback of two words; nothing seen if one of them is missing or has no mark.
+/// The feedback decoded from two words; nothing is seen if one of them is missing or has no mark.
 #[inline]
 pub fn decoded(words: [Option<u16>; 2]) -> GateFeedback {
     let [Some(on), Some(off)] = words else { return GateFeedback::default() };
@@ -81,7 +81,7 @@ pub fn decoded(words: [Option<u16>; 2]) -> GateFeedback {
     }
 }
 
-/// The words of a driver board that has seen this.
+/// The words that a driver board sends if it has seen this.
 pub const fn encoded(seen: GateFeedback) -> [u16; 2] {
     [FIRST_MARK | (seen.on & GATES), SECOND_MARK | (seen.off & GATES)]
 }

@@ -1,4 +1,4 @@
-//! The causes that hold the ZS9's gates off without software: their names, and the places where they were seen.
+//! The causes that keep the ZS9's gates off without software: their names, and the places where they were seen.
 
 use super::bridge::BREAKING;
 use super::start::bridge;
@@ -8,12 +8,12 @@ use crate::registers::Registers;
 use tractive::ports::HardwareBreak;
 use tractive::protection::Fault;
 
-/// The comparator on the gate drivers' ready wire, a bit as [`seen_by`] has it.
+/// The comparator on the gate drivers' ready wire, as a bit of [`seen_by`].
 const DRIVERS: u16 = 1 << 4;
 /// The comparators' bits lie above the timers'.
 const COMPARATORS: u16 = 3;
 
-/// The cause of a latched break; `None` when none is latched, or where the drive itself has broken.
+/// The cause of a latched break; `None` if none is latched, or if the drive itself has made the break.
 #[inline]
 pub fn latched_by(registers: &Registers) -> Option<HardwareBreak> {
     let outputs = bridge(registers).outputs();
@@ -21,7 +21,7 @@ pub fn latched_by(registers: &Registers) -> Option<HardwareBreak> {
     Some(HardwareBreak { fault, seen: outputs.broken() | seen_by(registers, &BREAKING) << COMPARATORS })
 }
 
-/// A cause that is there now.
+/// A cause that is present now.
 pub fn held_by(registers: &Registers) -> Option<Fault> {
     let seen = seen_by(registers, &BREAKING);
     if !pins::drivers_ready(registers) || seen & DRIVERS != 0 {

@@ -1,10 +1,10 @@
 //! The ZS9's drive on the NUCLEO-G474RE: nine gates from three timers.
 //!
-//! * PWM timers: TIM1, TIM8 and TIM20, one a leg, counting up from the carrier's valley and down from its peak; [`bridge`] says
-//!   how nine gates are played and what keeps a leg from being shorted, [`period`] how a period becomes compares.
+//! * PWM timers: TIM1, TIM8 and TIM20, one per leg, counting up from the carrier's valley and down from its peak; [`bridge`] says how nine gates are
+//!   played and what prevents a short through a leg, [`period`] how a period becomes compares.
 //! * Control timer: TIM2, started by TIM1, so that both count from one valley.
 //! * Converters: ADC1, ADC2 and ADC3 at every valley and every peak ([`sampling`]). Positions: encoders on TIM4 and TIM3.
-//! * What the gates really did is read from the driver board's latches ([`feedback`]).
+//! * The driver board's latches tell what the gates really did ([`feedback`]).
 //! * [`pins`] is the wiring, [`stage`] the scales, [`mod@start`] the order of the start.
 
 pub mod bridge;
@@ -32,7 +32,7 @@ use crate::built_in::zs9::BUILT_IN;
 use tractive::drive::dual::Settings;
 use tractive::machine::Ratings;
 
-/// The ratings as the operator looks at them.
+/// The ratings in the operator's form.
 pub static RATINGS: Ratings = Settings::operator_ratings(&BUILT_IN.ratings);
 
 /// The settings of the drive's tasks.

@@ -1,7 +1,7 @@
-//! A carrier period as the timers' shadow registers take it.
+//! A carrier period in the form that the timers' shadow registers take.
 //!
-//! The counter is 0 at the valley and [`HALF_CYCLES`] at the peak, and the way down is the mirror image of the way up. Of a
-//! leg's gates H is off around the peak, L around the valley, M in between: four compares.
+//! The counter is 0 at the valley and [`HALF_CYCLES`] at the peak, and the way down is the mirror image of the way up. Of a leg's gates H is off
+//! around the peak, L around the valley, and M in between: four compares.
 //!
 //! | gate | on while the counter is | compares |
 //! |---|---|---|
@@ -43,9 +43,9 @@ impl PeriodCompares {
     /// All nine gates off.
     pub const OFF: Self = Self { legs: [LegCompares::OFF; 3] };
 
-    /// From the modulator's period. `None` where an H is on again before the peak, or an L at the valley: as only the scheme
-    /// with its shoot-through in the centres of V14 and V15 has it; these timers have no compares for that. What one gate of a leg must
-    /// wait after another, `dead_cycles`, is the timers' doing; here only no shoot-through is left that is no longer than that.
+    /// Made of the modulator's period. `None` if an H is on again before the peak, or an L at the valley: only the scheme with its shoot-through in
+    /// the centres of V14 and V15 has that, and these timers have no compares for it. The timers enforce the wait between gates of a leg,
+    /// `dead_cycles`; here only a shoot-through that is no longer than that is removed.
     #[inline]
     pub fn new(period: &PlayedPeriod, dead_cycles: u16) -> Option<Self> {
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = &period.gates;
@@ -65,7 +65,7 @@ fn leg(high: &GateTicks, middle: &GateTicks, low: &GateTicks, dead_cycles: u16) 
     }
     let mut high = if high_pauses { high_from } else { HALF_CYCLES };
     let mut low = if low_pauses { low_to } else { 0 };
-    // A pause that the rounding would swallow is one cycle: the gate is expected to be seen off. Its neighbours make room.
+    // A pause that rounding would swallow becomes one cycle: the gate is expected to be seen off. Its neighbours make room.
     if high_pauses && high == HALF_CYCLES {
         high = HALF_CYCLES - 1;
         middle_to = middle_to.min(high);
@@ -80,7 +80,7 @@ fn leg(high: &GateTicks, middle: &GateTicks, low: &GateTicks, dead_cycles: u16) 
         low = low.min(middle_from);
         high = high.max(middle_to);
     }
-    // A shoot-through that the dead time would use up leaves its time to the dead time, whole.
+    // If the dead time would use up a shoot-through, all of its time is left to the dead time.
     if middle_from >= middle_to {
         if (1..=dead_cycles).contains(&high.saturating_sub(low)) {
             high = low;
@@ -96,7 +96,7 @@ fn leg(high: &GateTicks, middle: &GateTicks, low: &GateTicks, dead_cycles: u16) 
     Some(LegCompares { high, low, middle_from, middle_to })
 }
 
-/// Both ends of a pause, each to the nearest cycle. Rounding keeps order, and what was at the same instant stays so.
+/// Both ends of a pause, each rounded to the nearest cycle. Rounding keeps the order, and simultaneous instants stay so.
 #[inline]
 fn cycles(gate: &GateTicks) -> [u16; 2] {
     let nearest = |steps: u32| {

@@ -1,10 +1,10 @@
-//! The ZS9's wiring: the one table, from which the pins are configured and with which the documentation is compared.
+//! The ZS9's wiring: the one table from which the pins are configured and with which the documentation is compared.
 
 use crate::pins::{Function, Pin, Port, Wire, is_high, pin};
 use crate::registers::Registers;
 use crate::switchgear::Wires;
 
-/// Every pin the ZS9's drive uses.
+/// Every pin that the ZS9's drive uses.
 pub const PINS: [Pin; 38] = [
     pin(Port::A, 8, Function::Gate(6), &["TIM1_CH1"], "gate UH"),
     pin(Port::A, 10, Function::Gate(6), &["TIM1_CH3"], "gate UM"),

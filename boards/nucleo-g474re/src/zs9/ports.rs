@@ -17,7 +17,7 @@ use tractive::ports::{
 use tractive::protection::SafeState;
 use tractive::time::Instant;
 
-/// The dead time as the timers make it.
+/// The dead time as produced by the timers.
 const DEAD_CYCLES: u16 = match STAGE.common.dead_time() {
     Some(dead_time) => dead_time.cycles() as u16,
     None => panic!("no such dead time"),
@@ -34,8 +34,7 @@ pub struct Control<'a, P> {
 }
 
 impl<'a, P: Position> Control<'a, P> {
-    /// With the zeros that the start measured; positions of the upper and the lower motor, and where the sensors' word of themselves is
-    /// kept.
+    /// Made with the zeros that the start measured, the positions of the upper and the lower motor, and the place where the sensors' state is kept.
     pub const fn new(
         registers: Registers,
         zeros: Zeros,
@@ -58,7 +57,7 @@ impl<P: Position> ControlPort<Dual> for Control<'_, P> {
         self.timer.acknowledge();
     }
 
-    /// Positions first: they have been captured, and the conversions are still under way.
+    /// The positions come first: they have been captured, while the conversions are still under way.
     fn sample(&mut self, _now: Instant) -> DualSample {
         let [first, second] = &mut self.positions;
         let angles = [first.angle(), second.angle()];
@@ -80,7 +79,7 @@ impl<P: Position> ControlPort<Dual> for Control<'_, P> {
         }
     }
 
-    /// The link's voltage is the power stage's until the operator names one.
+    /// The link voltage is the power stage's until the operator sets one.
     fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
         operator().with_link(STAGE.link_ref_v)
     }
@@ -102,12 +101,12 @@ pub struct Pwm {
     samplers: Samplers,
     feedback: Feedback,
     zeros: Zeros,
-    /// A peak has been served since the last valley.
+    /// `true` if a peak has been served since the last valley.
     served: bool,
-    /// A valley has left conversions that nobody has read. The first peak has none: there the interrupt builds the drive before it gets
+    /// `true` if a valley has left conversions that nobody has read. The first peak has none: there the interrupt builds the drive before it gets
     /// here, and its own conversions are complete by then.
     stale: bool,
-    /// The period that runs has pulses.
+    /// `true` if the running period has pulses.
     pulses: bool,
 }
 
@@ -125,14 +124,14 @@ impl Pwm {
         }
     }
 
-    /// First thing in the interrupt.
+    /// First step in the interrupt.
     #[inline]
     pub fn acknowledge(&mut self) {
         self.bridge.acknowledge();
     }
 
-    /// Second thing: says whether the drive's task is to run, which is so at a peak. A
-    /// peak that was never served turns the gates off for good: the drive's time would be wrong from then on.
+    /// Second step: `true` if the drive's task is to run, which is the case at a peak. A peak that was never served turns the gates off for good: the
+    /// drive's time would be wrong from then on.
     #[inline]
     pub fn begin_half(&mut self) -> bool {
         match self.bridge.beat() {
@@ -149,7 +148,7 @@ impl Pwm {
                     self.samplers.forget();
                 }
                 if self.bridge.outputs().is_tripped() {
-                    // A break of one timer alone stops the others.
+                    // A break of one timer alone stops the others, too.
                     self.bridge.outputs().trip();
                 }
                 self.served = true;
@@ -175,9 +174,8 @@ impl PwmPort<Dual> for Pwm {
         }
     }
 
-    /// The outputs go on half a carrier period before the first pulses, while all compares still say off, and go off half a
-    /// period after the last ones. What these timers cannot play, and an interrupt that ends after its valley, turn the gates off
-    /// for good.
+    /// The outputs go on half a carrier period before the first pulses, while all compares still say off, and go off half a period after the last
+    /// ones. A period that these timers cannot play, or an interrupt that ends after its valley, turns the gates off for good.
     fn play(&mut self, _now: Instant, next: &PlayedPeriod) {
         let outputs = self.bridge.outputs();
         let Some(compares) = PeriodCompares::new(next, DEAD_CYCLES) else {

@@ -35,7 +35,7 @@ pub const HALF_CYCLES: u16 = {
     cycles as u16
 };
 
-/// The settings of the drive's tasks for two machines of a kind.
+/// The settings of the drive's tasks for two identical machines.
 pub const fn settings(tables: &Tables) -> Settings {
     Settings::new(CLOCK, CARRIER_TICKS, tables)
 }

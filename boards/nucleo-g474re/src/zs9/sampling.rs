@@ -7,8 +7,8 @@
 //! | 3 | lower motor, U | capacitors | |
 //! | 4 | lower motor, V | source | |
 //!
-//! Each interrupt reads its own beat's: the PWM interrupt forgets on entry what a valley nobody read has left, long before
-//! its own conversions are complete (2.4 µs), and what control reads has been taken at the peak before.
+//! Each interrupt reads the conversions of its own beat: on entry, the PWM interrupt discards those of a valley that nobody read, long before its own
+//! conversions are complete (2.4 µs), and control reads those taken at the peak before.
 
 use super::stage::{STAGE, Zs9Stage};
 use crate::power_stage::AdcCode;
@@ -17,7 +17,7 @@ use crate::sampling::{self, Sampler, Sequence};
 use crate::start::{StartError, Wait};
 use tractive::frames::Abc;
 
-/// JSQR.JEXTSEL: TIM1_TRGO2, of all three converters.
+/// JSQR.JEXTSEL: TIM1_TRGO2, for all three converters.
 const TRIGGER: u8 = 8;
 
 const FIRST: Sequence = Sequence { channels: [2, 7, 15, 5], count: 4, rejected: 0, trigger: TRIGGER };
@@ -41,7 +41,7 @@ pub struct Samplers {
     third: Sampler,
 }
 
-/// One beat's conversions, in SI units; NaN, which the drive's protection names, where a converter gave nothing.
+/// One beat's conversions, in SI units; NaN, which the drive's protection reports by name, if a converter gave nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Converted {
     /// Phase currents, in A.
@@ -53,7 +53,7 @@ pub struct Converted {
 }
 
 impl Samplers {
-    /// The chip's, or a test's.
+    /// The chip's own, or a test's.
     pub const fn new(registers: &Registers) -> Self {
         Self {
             first: Sampler { adc: registers.adc1, sequence: FIRST },
@@ -66,7 +66,7 @@ impl Samplers {
         [self.first, self.second, self.third]
     }
 
-    /// Clocked, calibrated, enabled; the zeros of the current sensors, while no current flows.
+    /// Clocks, calibrates and enables the converters; measures the zeros of the current sensors while no current flows.
     pub fn prepare(
         &self,
         registers: &Registers,
@@ -88,7 +88,7 @@ impl Samplers {
         })
     }
 
-    /// Converts once on command, for nothing, see [`Sampler::refresh`].
+    /// Converts once on command, as a dummy; see [`Sampler::refresh`].
     pub fn refresh(&self, wait: &mut dyn Wait) {
         self.all().iter().for_each(|sampler| sampler.refresh(wait));
     }
@@ -98,7 +98,7 @@ impl Samplers {
         self.all().iter().for_each(Sampler::follow_timer);
     }
 
-    /// Forgets the conversions that are complete by now: they belong to an earlier beat.
+    /// Discards the conversions that are complete by now: they belong to an earlier beat.
     #[inline]
     pub fn forget(&self) {
         self.first.forget();

@@ -1,4 +1,4 @@
-//! The start: what is configured, in which order. The gates stay off until all of it is done.
+//! The start: the configuration steps and their order. The gates stay off until all of it is done.
 
 use super::bridge::Bridge;
 use super::control_timer::ControlTimer;
@@ -14,8 +14,8 @@ use crate::{clock, pins as all_pins, watchdog};
 use stm32_metapac::comp::vals::Inm;
 use stm32_metapac::syscfg::regs::Swpr;
 
-/// Each current on one comparator, above; and the gate drivers' ready line below the internal reference. Where a current is too far
-/// below zero another one of its motor is above by half as much or more; the drive itself looks at both signs.
+/// Each current on one comparator, which trips above its threshold; and the gate drivers' ready line below the internal reference. If a current is
+/// too far below zero, another one of its motor is above by half as much or more; the drive itself checks both signs.
 const WATCHES: [Watch; 7] = [
     Watch::dac(1, false, false),
     Watch::dac(3, true, false),
@@ -41,8 +41,8 @@ pub struct Start<'a> {
 /// One step of the start.
 pub type Step = fn(&mut Start) -> Result<(), StartError>;
 
-/// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is theirs,
-/// and break inputs and comparators watch before that; nothing counts until [`run`].
+/// The steps in their order. The PWM timers are locked into their safe configuration before any gate pin is connected to them, and break inputs and
+/// comparators are active before that; nothing counts until [`run`].
 pub const STEPS: [(&str, Step); 12] = [
     ("dead-battery pull-downs", |start| {
         clock::release_dead_battery(start.registers, start.wait);
@@ -51,11 +51,11 @@ pub const STEPS: [(&str, Step); 12] = [
     ("clock tree", |start| clock::configure(start.registers, start.wait)),
     ("peripheral clocks", |start| {
         clock::enable_peripherals(start.registers, start.wait);
-        // The CCM SRAM holds the interrupts' code alone: nobody writes there any more.
+        // The CCM SRAM holds the interrupts' code alone: nobody writes to it any more.
         start.registers.syscfg.swpr().write_value(Swpr(u32::MAX));
         Ok(())
     }),
-    // Not earlier: what is refused is told over the bus, which needs the crystal and its pins.
+    // Not earlier: a refusal is reported over the bus, which needs the crystal and its pins.
     ("reset cause", |start| watchdog::refuse_after_bite(start.registers)),
     ("inputs", |start| {
         all_pins::configure_inputs(start.registers, &pins::PINS);
@@ -94,15 +94,15 @@ pub const STEPS: [(&str, Step); 12] = [
     ("watchdog", |start| watchdog::start(start.registers, start.wait)),
 ];
 
-/// All steps; gives the zeros of the current sensors. After one that fails all outputs are off for good.
+/// Runs all steps; returns the zeros of the current sensors. After one that fails all outputs are off for good.
 pub fn prepare(registers: &Registers, wait: &mut dyn Wait) -> Result<Zeros, StartError> {
     let mut start = Start { registers, wait, stage: &STAGE, zeros: Zeros::default() };
     let done = STEPS.iter().try_for_each(|(_, step)| step(&mut start));
     done.inspect_err(|_| switch_off(registers, &pins::PINS)).and(Ok(start.zeros))
 }
 
-/// All timers count from this instant on, a valley; from their next beat on the converters follow them. Everything must be
-/// prepared, and the interrupts be ready.
+/// All timers count from this instant on, a valley; the converters follow them from their next beat on. Everything must be prepared, and the
+/// interrupts ready.
 pub fn run(registers: &Registers, wait: &mut dyn Wait) {
     let samplers = Samplers::new(registers);
     samplers.refresh(wait);

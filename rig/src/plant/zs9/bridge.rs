@@ -1,4 +1,4 @@
-//! The nine-switch bridge: which rail each motor's terminals are on.
+//! The nine-switch bridge: the rail to which each motor's terminals are connected.
 
 use super::Vector;
 use crate::plant::legs::Clamp;
@@ -27,7 +27,7 @@ impl LegGates {
     /// All three off.
     pub const OFF: Self = Self { high: false, middle: false, low: false };
 
-    /// The connection of upper and lower terminal to the positive rail; `None` unless that is what the leg decides.
+    /// The connection of upper and lower terminal to the positive rail; `None` unless the gates alone determine it.
     fn terminals(self) -> Option<[bool; 2]> {
         match (self.high, self.middle, self.low) {
             (true, false, true) => Some([true, false]),
@@ -44,7 +44,7 @@ impl fmt::Display for LegGates {
     }
 }
 
-/// Gates that the bridge must not have.
+/// Gates that are not allowed for the bridge.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("leg {leg} at {time_s:.7} s: gates {gates}: must be 101, 011, 110 or 111, or 000 in all three legs")]
 pub struct IllegalState {
@@ -61,16 +61,16 @@ pub struct IllegalState {
 pub enum Bridge {
     /// Every terminal on a rail: for the upper and the lower motor, the terminals' shares of the link as a vector.
     Driven([Vector; 2]),
-    /// A leg shorts the link: all terminals are at one potential.
+    /// A leg shorts the link: all terminals are at the same potential.
     Short,
     /// All gates off: the diodes decide.
     Off,
-    /// Gates stuck: where they leave a terminal free, the diodes decide.
+    /// Gates stuck: the diodes decide for each terminal that they leave free.
     Partly([LegGates; 3]),
 }
 
 impl Bridge {
-    /// Judges the gates of the legs u, v, w. The error names the first leg whose state is illegal.
+    /// Checks the gates of the legs u, v, w. The error names the first leg whose state is illegal.
     pub fn of(gates: [LegGates; 3], time_s: f64) -> Result<Self, IllegalState> {
         if gates == [LegGates::OFF; 3] {
             return Ok(Self::Off);
@@ -89,7 +89,7 @@ impl Bridge {
         Ok(if short { Self::Short } else { Self::Driven(shares.map(Vector::clarke)) })
     }
 
-    /// The same where gates are stuck: any state may be. A leg with all gates on shorts the link, whatever the others do.
+    /// The same if gates are stuck: any state may occur. A leg with all gates on shorts the link, whatever the others do.
     pub fn of_any(gates: [LegGates; 3]) -> Self {
         if gates.contains(&LegGates::SHOOT_THROUGH) {
             return Self::Short;
@@ -97,7 +97,7 @@ impl Bridge {
         Self::of(gates, 0.0).unwrap_or(Self::Partly(gates))
     }
 
-    /// `true` if diodes decide on a terminal.
+    /// `true` if diodes decide for a terminal.
     pub fn is_free(&self) -> bool {
         matches!(self, Self::Off | Self::Partly(_))
     }
@@ -105,15 +105,13 @@ impl Bridge {
 
 /// The terminals' shares of the link while all gates are off.
 ///
-/// A leg's three diodes are in series, all conducting towards the positive rail. Current out of the leg comes from the
-/// negative rail, current into it goes to the positive one; where the upper motor takes current, or the lower one gives it, the
-/// middle diode joins the two terminals and their sum decides. Around zero current each share goes over linearly, as
-/// [`Clamp`] has it. The link carries the shares times the currents, so no energy is lost.
+/// A leg's three diodes are in series, all conducting towards the positive rail. Current out of the leg comes from the negative rail, current into it
+/// goes to the positive one; if the upper motor takes current, or the lower one gives it, the middle diode connects the two terminals and their sum
+/// decides. Around zero current each share changes linearly, as in [`Clamp`]. The link carries the shares times the currents, so no energy is lost.
 ///
-/// The middle diodes put the motors in series: current flows where the EMFs of both together exceed the link, although neither
-/// does alone.
+/// The middle diodes put the motors in series: current flows if the sum of both EMFs exceeds the link, although neither does alone.
 ///
-/// A gate that is on ties its two sides together.
+/// A gate that is on connects its two sides.
 pub fn freewheeling(
     clamp: &Clamp,
     gates: &[LegGates; 3],
@@ -176,8 +174,8 @@ mod tests {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/ipm-zs9");
         let machine = tractive_tablegen::MachineFolder::read(&folder).unwrap();
         let clamp = Clamp::new(85.0, &tractive_tablegen::SmoothMap::new(&machine.map), 1.0);
-        // Currents out of a leg to the upper and to the lower motor; then whether the terminals are positive. With i > 0 to
-        // the upper motor or i < 0 to the lower one the middle diode joins them.
+        // Currents out of a leg to the upper and to the lower motor; then `true` for each positive terminal. With i > 0 to the upper motor or i < 0
+        // to the lower one the middle diode connects them.
         let legs = [
             (10.0, 10.0, [0.0, 0.0]),
             (-10.0, 10.0, [1.0, 0.0]),
@@ -187,7 +185,7 @@ mod tests {
         ];
         for (upper, lower, terminals) in legs {
             let shares = freewheeling(&clamp, &[LegGates::OFF; 3], [upper, 0.0, 0.0], [lower, 0.0, 0.0]);
-            // The other legs carry nothing and stand in the middle.
+            // The other legs carry no current and are in the middle.
             let expected = terminals.map(|share| Vector::clarke([share, 0.5, 0.5]));
             assert_eq!(shares, expected, "{upper} {lower}");
         }

@@ -1,29 +1,29 @@
-//! A source that cannot take current back: where the diode begins and ends to conduct.
+//! A source that cannot take current back: the instants at which the diode begins and ends to conduct.
 //!
-//! With `x = i1 + i2 − i_demand`, the source gives x while x > 0. While x < 0 the bridge cannot get what its gates ask for:
-//! its own diodes conduct from rail to rail and short the link, which feeds the inductors from the capacitors until
-//! x = 0. There the link's voltage is what holds x, between 0 and its voltage under the source.
+//! With `x = i1 + i2 − i_demand`, the source gives x while x > 0. While x < 0 the bridge cannot get what its gates ask for: its own diodes conduct
+//! from rail to rail and short the link, which feeds the inductors from the capacitors until x = 0. Then the link takes the voltage that holds x
+//! there, between 0 and its voltage under the source.
 //!
-//! Under a source of both directions the link can only fall to nothing: where `v1 + v2` would fall below the source, the diodes of
-//! the bridge conduct from rail to rail until the inductors raise it again.
+//! With a bidirectional source the link can only fall to zero: if `v1 + v2` would fall below the source, the diodes of the bridge conduct from rail
+//! to rail until the inductors raise it again.
 
 use super::bridge::Bridge;
 use super::step::{Feed, Trial};
 use super::{Source, Zs9Plant};
 
-/// Excess that counts as none, in A.
+/// Excess that counts as zero, in A.
 const NONE_A: f64 = 1e-6;
-/// Link voltage that counts as none, in V.
+/// Link voltage that counts as zero, in V.
 const NONE_V: f64 = 1e-6;
-/// Longest step while neither source nor diodes conduct, in s: the voltage that holds is followed so closely.
+/// Longest step while neither source nor diodes conduct, in s: short enough to follow the holding voltage.
 const LONGEST_BLOCKED_S: f64 = 5e-6;
-/// Shortest step, in s, so that time goes on where conduction changes at once.
+/// Shortest step, in s, so that time advances even if conduction changes at once.
 const SHORTEST_S: f64 = 1e-10;
 /// Halvings of a step in which conduction changes.
 const HALVINGS: u32 = 40;
 
 impl Zs9Plant {
-    /// A step of at most `longest_s`, shorter where conduction changes. Returns its length, in s.
+    /// Makes a step of at most `longest_s`, shorter if conduction changes. Returns its length, in s.
     pub(super) fn step(&mut self, bridge: &Bridge, longest_s: f64) -> f64 {
         if *bridge == Bridge::Short {
             return self.step_with(bridge, Feed::Short, longest_s);
@@ -42,7 +42,7 @@ impl Zs9Plant {
         dt_s
     }
 
-    /// Takes a step, and notes the link's voltage after it.
+    /// Takes a step, and stores the link's voltage after it.
     fn take_at(&mut self, trial: &Trial, bridge: &Bridge, feed: Feed) {
         self.take(trial);
         self.bridge_v = self.link_now_v(bridge, feed);
@@ -55,7 +55,7 @@ impl Zs9Plant {
             self.take_at(&trial, bridge, feed);
             return longest_s;
         }
-        // The longest step within which nothing changes, and a little more, so that the change has come.
+        // The longest step within which nothing changes, and a little more, so that the change has occurred.
         let (mut low, mut high) = (0.0, longest_s);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);

@@ -9,25 +9,25 @@
 //! | −1 | `i_u + i_l` | `i_l` | – |
 //! | shoot-through, `j` in L | `j + i_l + i_u` | `j + i_l` | `j` |
 //!
-//! Of a device that is on, current forward flows through the IGBT, current backward through the diode. Of gates that are off or stuck the diodes are ideal, and so
-//! are those that short the link by themselves.
+//! In a device that is on, forward current flows through the IGBT and reverse current through the diode. The diodes of gates that are off or stuck are ideal,
+//! and so are those that short the link by themselves.
 
 use super::Vector;
 use super::bridge::LegGates;
 use crate::plant::legs::Clamp;
 use crate::plant::{DeviceDrops, Leg};
 
-/// The devices, and how their thresholds fade near zero current.
+/// The devices, and the fading of their thresholds near zero current.
 #[derive(Clone, Copy)]
 pub struct Devices<'a> {
     pub drops: &'a DeviceDrops,
     pub clamp: &'a Clamp,
 }
 
-/// The voltages that are lost in a bridge.
+/// The voltages lost in a bridge.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Lost {
-    /// By how much the terminals of the upper motor and of the lower one are below what their shares of the link say, as vectors, in V.
+    /// Voltage by which the terminals of the upper and of the lower motor are below their shares of the link, as vectors, in V.
     pub terminals: [Vector; 2],
     /// The link's voltage in shoot-through, in V.
     pub short_v: f64,
@@ -37,17 +37,17 @@ pub struct Lost {
 pub type Currents = [[f64; 3]; 2];
 
 impl Devices<'_> {
-    /// The drop of a device that is on, by its current from the positive rail to the negative one, in V.
+    /// The drop of a device that is on, from its current from the positive rail to the negative one, in V.
     fn device_v(&self, current_a: f64) -> f64 {
         self.drops.drop_v(Leg::Upper, current_a, self.clamp.near_zero(current_a))
     }
 
-    /// The drop of the source's switch, in V, by the source's current: its diode gives, its IGBT takes back.
+    /// The drop of the source's switch, in V, from the source's current: its diode gives, its IGBT takes back.
     pub fn source_v(&self, current_a: f64) -> f64 {
         self.drops.drop_v(Leg::Lower, current_a, self.clamp.near_zero(current_a))
     }
 
-    /// By how much both terminals of a leg are below their rails, in V; without shoot-through.
+    /// Voltage by which both terminals of a leg are below their rails, in V; without shoot-through.
     fn leg_v(&self, gates: LegGates, upper_a: f64, lower_a: f64) -> [f64; 2] {
         let both_a = upper_a + lower_a;
         match gates {
@@ -70,7 +70,7 @@ impl Devices<'_> {
         Lost { terminals: vectors(legs), short_v: 0.0 }
     }
 
-    /// The same in shoot-through, in which the bridge takes a current in A. Several legs that short the link share it evenly.
+    /// The same in shoot-through, in which the bridge takes a current in A. If several legs short the link they share it evenly.
     pub fn shorted(&self, gates: &[LegGates; 3], [upper, lower]: Currents, bridge_a: f64) -> Lost {
         let short = |leg: usize| gates[leg] == LegGates::SHOOT_THROUGH;
         let high_a = |leg: usize| match gates[leg] {
@@ -95,7 +95,7 @@ impl Devices<'_> {
                 LegGates::SHOOT_THROUGH => [-middle_v, -low_v],
                 other => {
                     let [upper_v, lower_v] = self.leg_v(other, upper[leg], lower[leg]);
-                    // The shares of a shorted bridge are none.
+                    // The shares of a shorted bridge are zero.
                     [upper_v - ideal(other.high), lower_v - ideal(other == LegGates::MINUS_ONE)]
                 }
             }

@@ -51,7 +51,7 @@ pub struct Adder {
 }
 
 impl Adder {
-    /// A step: its integrals of states and torques; phase currents and speeds go along straight lines.
+    /// Adds a step: its integrals of states and torques; phase currents and speeds change linearly.
     #[inline]
     pub fn add(
         &mut self,
@@ -75,7 +75,7 @@ impl Adder {
         }
     }
 
-    /// The sums of a span that follows this one.
+    /// Adds the sums of a span that follows this one.
     pub fn append(&mut self, later: &Self) {
         self.span_s += later.span_s;
         for (sum, part) in self.areas.iter_mut().zip(later.areas) {

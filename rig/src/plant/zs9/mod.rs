@@ -5,13 +5,13 @@
 //!                                            upper motor  lower motor
 //! ```
 //!
-//! Ideal switches, unless they have drops. Dead time is the affair of the gates, not of the plant: while a leg waits, its diodes make one of the states that
-//! are known here. Between two edges of the gates network and motors are integrated together, as one set of equations. Outside shoot-through the bridge draws
-//! `i_in = 1.5 Σ (s·i)` at `U_in = v1 + v2 − U_dc`, s being the terminals' shares of the link as a vector, and a motor sees
-//! `u = U_in s`; so what leaves the network enters the motors, also while the diodes of a bridge without gates decide on s.
-//! In shoot-through the source is apart, and `U_in = 0`.
+//! Ideal switches, unless they have drops. Dead time is handled by the gates, not by the plant: while a leg waits, its diodes make one of the states that are
+//! known here. Between two edges of the gates, network and motors are integrated together, as one set of equations. Outside shoot-through the bridge draws
+//! `i_in = 1.5 Σ (s·i)` at `U_in = v1 + v2 − U_dc`, s being the terminals' shares of the link as a vector, and a motor sees `u = U_in s`; so everything that
+//! leaves the network enters the motors, even while the diodes of a bridge without gates decide on s. In shoot-through the source is disconnected, and
+//! `U_in = 0`.
 //!
-//! Where the network would be charged to less than half the source, the bridge's diodes hold `U_in` at 0.
+//! If the network would be charged to less than half the source, the bridge's diodes hold `U_in` at 0.
 
 mod bridge;
 mod diode;
@@ -31,13 +31,13 @@ use super::{DeviceDrops, PlantSettings, SpeedSource};
 use bridge::Bridge;
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
-/// Link voltage for which steps are short enough at least, in V.
+/// Lowest link voltage for which the length of steps is computed, in V.
 const LEAST_LINK_V: f64 = 50.0;
 
-/// The connection of the source with the network.
+/// The connection of the source to the network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Source {
-    /// A switch for both directions, on outside shoot-through.
+    /// A bidirectional switch, on outside shoot-through.
     #[default]
     Bidirectional,
     /// A diode: no current back into the source.
@@ -49,7 +49,7 @@ pub enum Source {
 pub struct Zs9Settings {
     /// The network.
     pub network: ZNetwork,
-    /// The connection of the source with it.
+    /// The connection of the source to it.
     pub source: Source,
     /// Source voltage U_dc, in V, above 0.
     pub source_v: f64,
@@ -85,7 +85,7 @@ pub struct Zs9Energies {
 /// Source, network, bridge, motors.
 #[derive(Clone, Debug)]
 pub struct Zs9Plant {
-    /// Inductances and capacitances of the network; change them, as all of this, between two steps.
+    /// Inductances and capacitances of the network; change them, like everything here, between two steps.
     pub parts: ZNetwork,
     whole: ZNetwork,
     /// The connection between source and network.
@@ -109,8 +109,8 @@ pub struct Zs9Plant {
 }
 
 impl Zs9Plant {
-    /// The upper motor and the lower one, both without current and at angle zero, turning as their speed sources say; the
-    /// capacitors charged to the source's voltage, no current in the inductors.
+    /// The upper motor and the lower one, both without current and at angle zero, turning as their speed sources say; the capacitors are charged to
+    /// the source's voltage, and the inductors carry no current.
     pub fn new(machines: [&MachineFolder; 2], speeds: [SpeedSource; 2], settings: &Zs9Settings) -> Self {
         let [clamp, other] = [0, 1].map(|k| {
             let map = SmoothMap::new(&machines[k].map);
@@ -138,12 +138,12 @@ impl Zs9Plant {
         }
     }
 
-    /// Has the network's parts be those that it was made with.
+    /// Restores the network's original parts.
     pub fn mend_network(&mut self) {
         self.parts = self.whole;
     }
 
-    /// Has both machines' true flux linkage be another multiple of their maps', above 0. Currents stay as they are.
+    /// Sets both machines' true flux linkage to a multiple of their maps', above 0. Currents stay as they are.
     pub fn set_flux_scale(&mut self, flux_scale: f64) {
         let [motor, _] = &self.motors;
         self.clamp = self.clamp.scaled(flux_scale / motor.stator.flux_scale());
@@ -152,8 +152,8 @@ impl Zs9Plant {
         }
     }
 
-    /// Lets time pass with the gates of the legs u, v, w unchanged. The error names the first leg whose gates are illegal;
-    /// nothing has happened then.
+    /// Lets time pass with the gates of the legs u, v, w unchanged. The error names the first leg whose gates are illegal; in that case nothing has
+    /// happened.
     pub fn advance(&mut self, gates: [LegGates; 3], dt_s: f64) -> Result<(), IllegalState> {
         let bridge = Bridge::of(gates, self.time_s)?;
         self.gates = gates;
@@ -161,7 +161,7 @@ impl Zs9Plant {
         Ok(())
     }
 
-    /// The same where gates are stuck, so that any state may be.
+    /// The same if gates are stuck, so that any state may occur.
     pub fn advance_any(&mut self, gates: [LegGates; 3], dt_s: f64) {
         self.gates = gates;
         self.advance_bridge(&Bridge::of_any(gates), dt_s);
@@ -171,7 +171,7 @@ impl Zs9Plant {
         let mut left = dt_s;
         while left > 0.0 {
             let longest = if bridge.is_free() { self.open_step_s() } else { LONGEST_STEP_S };
-            // Even pieces, as long as nothing else shortens them.
+            // Equal pieces, unless something else shortens them.
             let step = if bridge.is_free() { left.min(longest) } else { left / (left / longest).ceil() };
             let taken = self.step(bridge, step);
             left = if taken >= left { 0.0 } else { left - taken };
@@ -189,8 +189,8 @@ impl Zs9Plant {
         v1 + v2 - self.source_v
     }
 
-    /// The link's true voltage, in V, in shoot-through that outside it: [`Self::link_v`], but where a source that takes nothing back holds it lower, or the bridge's
-    /// own diodes short it.
+    /// The link's true voltage, in V; in shoot-through that outside it: [`Self::link_v`], unless a source that takes nothing back holds it lower, or the
+    /// bridge's own diodes short it.
     pub fn bridge_v(&self) -> f64 {
         self.bridge_v
     }
@@ -211,12 +211,12 @@ impl Zs9Plant {
             - (self.stored_j() - stored_j)
     }
 
-    /// Mean values since this was last called; `None` if no time has passed.
+    /// Mean values since the last call; `None` if no time has passed.
     pub fn take_means(&mut self) -> Option<Means> {
         self.take_sums().means(self.source_v)
     }
 
-    /// The sums that those are made of, since this was last called.
+    /// The sums behind those means, since the last call.
     pub fn take_sums(&mut self) -> Adder {
         std::mem::take(&mut self.means)
     }
@@ -225,7 +225,7 @@ impl Zs9Plant {
     fn open_step_s(&self) -> f64 {
         let [upper, lower] = self.motors.each_ref().map(Motor::currents_abc);
         let near = upper.iter().zip(&lower).map(|(u, l)| u.abs().min(l.abs()).min((u + l).abs()));
-        // A link that is shorted by the diodes may rise within the step.
+        // A link shorted by the diodes may rise within the step.
         self.clamp.step_near_s(self.link_v().max(LEAST_LINK_V), near.fold(f64::INFINITY, f64::min))
     }
 }

@@ -26,7 +26,7 @@ impl ZNetwork {
     /// The paper's ZS9: 0.5 mH, 10 mΩ, 500 µF.
     pub const ZS9: Self = Self { inductance_h: 0.5e-3, resistance_ohm: 10e-3, capacitance_f: 500e-6 };
 
-    /// The one that a machine folder names.
+    /// The network that a machine folder names.
     pub fn of(parameters: &Parameters) -> Self {
         Self {
             inductance_h: parameters.zs9_inductance_h,
@@ -38,9 +38,8 @@ impl ZNetwork {
     /// Rates of change, in A/s and V/s, with `feed_v` across the source's side and `bridge_a` into the bridge:
     /// `L di1/dt = u_s − v2 − r i1`, `L di2/dt = u_s − v1 − r i2`, `C dv1/dt = i2 − i_in`, `C dv2/dt = i1 − i_in`.
     ///
-    /// The bridge then sees `U_in = v1 + v2 − u_s`, and the source gives `i1 + i2 − i_in`. In shoot-through the source is
-    /// apart and the bridge is a short: `u_s = v1 + v2`, `i_in = i1 + i2`, which gives `L di1/dt = v1 − r i1`,
-    /// `C dv1/dt = −i1`, and likewise for the others.
+    /// The bridge then sees `U_in = v1 + v2 − u_s`, and the source gives `i1 + i2 − i_in`. In shoot-through the source is disconnected and the bridge
+    /// is a short: `u_s = v1 + v2`, `i_in = i1 + i2`, which gives `L di1/dt = v1 − r i1`, `C dv1/dt = −i1`, and likewise for the others.
     #[inline]
     pub fn slopes(&self, at: &NetworkState, feed_v: f64, bridge_a: f64) -> NetworkState {
         let ([i1, i2], [v1, v2]) = (at.inductors_a, at.capacitors_v);
@@ -69,7 +68,7 @@ impl ZNetwork {
 }
 
 impl NetworkState {
-    /// Charged evenly, with even currents.
+    /// Both capacitors charged equally, with equal inductor currents.
     pub fn even(inductor_a: f64, capacitor_v: f64) -> Self {
         Self { inductors_a: [inductor_a; 2], capacitors_v: [capacitor_v; 2] }
     }

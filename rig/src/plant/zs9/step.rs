@@ -13,19 +13,19 @@ use crate::plant::{StatorSlopes, Turning};
 pub enum Feed {
     /// The source: `u_s = U_dc`.
     Source,
-    /// Nothing, while the bridge is a short, by its gates or by its diodes: `u_s = v1 + v2`.
+    /// Nothing, while the bridge is a short, through its gates or its diodes: `u_s = v1 + v2`.
     Short,
-    /// Nothing, while the bridge takes all of the inductors' current: u_s is what keeps `i1 + i2 = i_in`.
+    /// Nothing, while the bridge takes all of the inductors' current: u_s is the voltage that keeps `i1 + i2 = i_in`.
     Blocked,
-    /// The source, while the bridge's diodes keep the link from turning round: `U_in = 0`, so `v1 + v2 = U_dc` stays as it is, and
-    /// the bridge takes half of the inductors' current.
+    /// The source, while the bridge's diodes keep the link from reversing: `U_in = 0`, so `v1 + v2 = U_dc` stays as it is, and the bridge takes half
+    /// of the inductors' current.
     Clamped,
 }
 
 /// id and iq of the upper motor, of the lower one; i1, i2; v1, v2.
 type State = [f64; 8];
-/// For the upper motor, then for the lower one: electrical energy, copper loss, the torque's impulse. Then energy from
-/// the source, loss of the inductors, loss of the devices.
+/// Electrical energy, copper loss and the torque's impulse of the upper motor, then of the lower one. Then energy from the source, loss of the
+/// inductors, loss of the devices.
 type Sums = [f64; 9];
 
 /// A motor's rotor frame at an instant.
@@ -37,7 +37,7 @@ struct Frame {
     share: (f64, f64),
 }
 
-/// A step that may yet be taken.
+/// A step that has been computed but not yet taken.
 pub struct Trial {
     dt_s: f64,
     state: State,
@@ -99,7 +99,7 @@ impl Zs9Plant {
         self.means.add(dt_s, &area, [sums[2], sums[5]], &before, &self.seen());
     }
 
-    /// The values at a step's end that the means take.
+    /// The values at a step's end that enter the means.
     fn seen(&self) -> [Seen; 2] {
         both(|k| {
             let motor = &self.motors[k];
@@ -108,8 +108,8 @@ impl Zs9Plant {
         })
     }
 
-    /// The excess of the inductors' current over what the bridge's gates ask for, in A: the source gives it, or, below zero,
-    /// the bridge's diodes take up the difference.
+    /// The excess of the inductors' current over the current that the bridge's gates ask for, in A: the source gives it, or, if negative, the
+    /// bridge's diodes take up the difference.
     pub(super) fn excess_a(&self, bridge: &Bridge) -> f64 {
         let y = self.state();
         let still = self.still(bridge);
@@ -122,7 +122,7 @@ impl Zs9Plant {
         y[4] + y[5] - self.demand(y, &self.shares(y, &trial.end, bridge))
     }
 
-    /// The excess of half of the inductors' current over what the bridge's gates ask for, in A: the link rises; below zero it falls.
+    /// The excess of half of the inductors' current over the current that the bridge's gates ask for, in A: if positive the link rises; if negative it falls.
     pub(super) fn rising_a(&self, bridge: &Bridge) -> f64 {
         let y = self.state();
         0.5 * (y[4] + y[5]) - self.demand(&y, &self.shares(&y, &self.still(bridge), bridge))
@@ -152,7 +152,7 @@ impl Zs9Plant {
         trial.state[6] + trial.state[7] - self.source_v
     }
 
-    /// The link voltage at which that excess stays as it is, in V, as a share of the link's voltage under the source.
+    /// The link voltage at which that excess stays constant, as a share of the link's voltage under the source.
     pub(super) fn holding_share(&self, bridge: &Bridge) -> f64 {
         let y = self.state();
         let still = self.still(bridge);
@@ -167,7 +167,7 @@ impl Zs9Plant {
         frames(bridge, both(|k| self.motors[k].rotor.sin_cos()), &turning, 0.0)
     }
 
-    // Four of them are a step, and most of a run: they are compiled into it, whatever they are compiled for.
+    // Each step needs four of them, which is most of a run: they are compiled into it, whatever they are compiled for.
     #[inline(always)]
     fn rates(&self, y: &State, frames: &[Frame; 2], bridge: &Bridge, feed: Feed) -> (State, Sums) {
         let shares = self.shares(y, frames, bridge);
@@ -221,7 +221,7 @@ impl Zs9Plant {
         self.drops.as_ref().map(|drops| Devices { drops, clamp: &self.clamp })
     }
 
-    /// The voltages that the bridge's devices take from both motors, in the rotor frames, and the link's in shoot-through.
+    /// The voltages that the bridge's devices take from both motors, in the rotor frames, and the link's voltage in shoot-through.
     #[inline]
     fn lost(&self, y: &State, frames: &[Frame; 2], bridge: &Bridge) -> (Shares, f64) {
         let Some(devices) = self.devices() else { return ([(0.0, 0.0); 2], 0.0) };
@@ -280,7 +280,7 @@ impl Zs9Plant {
                 .map(|k| {
                     let slopes = self.motor_slopes(k, y, frames, shares, link_v);
                     let ((d, q), omega) = (shares.0[k], frames[k].omega);
-                    // The shares stand still while the frame turns.
+                    // The shares are constant while the frame turns.
                     1.5 * (d * (slopes.id_a_s - omega * y[2 * k + 1])
                         + q * (slopes.iq_a_s + omega * y[2 * k]))
                 })
@@ -298,7 +298,7 @@ impl Zs9Plant {
 /// The terminals' shares of the link for both motors, d and q.
 type Shares = [(f64, f64); 2];
 
-/// Both frames a time after the step's beginning.
+/// Both frames at a time after the step's beginning.
 #[inline(always)]
 fn frames(bridge: &Bridge, sin_cos: [(f64, f64); 2], turning: &[Turning; 2], t_s: f64) -> [Frame; 2] {
     let stationary = match bridge {
@@ -312,19 +312,19 @@ fn frames(bridge: &Bridge, sin_cos: [(f64, f64); 2], turning: &[Turning; 2], t_s
     })
 }
 
-/// The same of the upper motor and of the lower one; an array's `map` is not compiled into its place.
+/// The same for the upper motor and for the lower one; an array's `map` is not inlined.
 #[inline(always)]
 fn both<T>(of: impl Fn(usize) -> T) -> [T; 2] {
     [of(0), of(1)]
 }
 
-/// Sine and cosine after turning by an angle in rad.
+/// Sine and cosine after a rotation by an angle in rad.
 #[inline]
 fn turned(from: (f64, f64), by: f64) -> (f64, f64) {
     rotated(from, small_sin_cos(by))
 }
 
-/// Sine and cosine; for the small angle of a step by a series that is exact to rounding.
+/// Sine and cosine; the small angle of a step uses a series that is exact to rounding.
 #[inline]
 fn small_sin_cos(x: f64) -> (f64, f64) {
     const SMALL: f64 = 0.05;

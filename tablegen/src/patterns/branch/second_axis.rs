@@ -1,24 +1,24 @@
-//! A second axis of the table, the torque, and what it would buy: patterns made anew for other points than the one they are made for.
+//! A second axis of the table, the torque, and its possible benefit: patterns recomputed for operating points other than the one they were made for.
 //!
-//! Of the flux harmonics `a` of order 6k − 1 and `b` of 6k + 1 the sum is ripple along the fundamental's flux, the difference ripple along
-//! its voltage. So with a gain of ripple current by ripple flux of `g` along the one and `h` along the other the distortion of the
-//! current is, but for a factor, `Σ (a² + b² + 2 ρ a b)` with `ρ = (g² − h²)/(g² + h²)`: all of a machine and its operating point is one number.
+//! For the flux harmonics `a` of order 6k − 1 and `b` of 6k + 1, the sum is ripple along the fundamental's flux and the difference is ripple along
+//! its voltage. So with a gain from ripple flux to ripple current of `g` along the one and `h` along the other, the distortion of the current is,
+//! except for a factor, `Σ (a² + b² + 2 ρ a b)` with `ρ = (g² − h²)/(g² + h²)`: a machine and its operating point enter only through this one number.
 
 use super::*;
 use crate::{MachineFolder, Optimum, SmoothMap};
 
-/// ρ at the reference machine's operating points from a quarter of its torque up, in weakening too.
+/// ρ at the reference machine's operating points from a quarter of its torque up, including field weakening.
 const SKEWS: [f64; 4] = [-0.44, -0.2, 0.25, 0.34];
-/// Directions in which ripple flux makes torque there, ahead of the fundamental's voltage or behind it, in degrees; the last one at the largest
-/// torque in weakening alone.
+/// Directions in which ripple flux makes torque there, ahead of the fundamental's voltage or behind it, in degrees; the last one applies only at the
+/// largest torque in weakening.
 const DIRECTIONS: [f64; 5] = [6.0, 23.0, 48.0, 60.0, 90.0];
-/// Its currents (id, iq) in weakening at 2,700 r/min and 1,500 V, in A, at the largest torque, 900 and 600 N·m.
+/// The reference machine's currents (id, iq) in weakening at 2,700 r/min and 1,500 V, in A, at the largest torque, 900 and 600 N·m.
 const WEAKENED: [(f64, f64); 3] = [(-202.6, 75.3), (-172.5, 78.7), (-97.4, 77.3)];
 /// Harmonics that count, six a turn each.
 const HARMONICS: usize = 40;
 
-/// For a cost beside the distortion's square, the largest and the mean share by which patterns made for it are better, over every fifth
-/// node of a branch.
+/// For a cost other than the distortion's square, the largest and the mean share by which patterns made for it are better, over every fifth node of a
+/// branch.
 fn bought(
     followed: &Followed,
     bounds: &[(f64, f64)],
@@ -40,7 +40,7 @@ fn bought(
     (shares.iter().copied().fold(0.0, f64::max), shares.iter().sum::<f64>() / shares.len() as f64)
 }
 
-/// ρ at a current, and the angle of the torque's direction to the voltage, in degrees: from the flux linkage, and the currents that a ripple of it makes.
+/// ρ at a current, and the angle of the torque's direction to the voltage, in degrees, from the flux linkage and the currents that a ripple of it causes.
 fn seen_by_the_machine(map: &SmoothMap, (id_a, iq_a): (f64, f64)) -> (f64, f64) {
     let at = map.at(id_a, iq_a);
     let det = at.ldd_h * at.lqq_h - at.ldq_h * at.lqd_h;
@@ -98,7 +98,7 @@ fn a_second_axis_would_buy_little() {
                 &format!(" | ρ {skew:5}: {:4.1} % at most, {:4.1} % on average", 100.0 * most, 100.0 * mean);
             least_distortion = least_distortion.max(most);
         }
-        // In weakening at the largest torque the patterns next to six-step are played.
+        // In weakening at the largest torque the patterns next to six-step are used.
         let is_last = branch.pulses <= 5 && branch.window.1 >= 97;
         for degrees in DIRECTIONS.into_iter().filter(|degrees| *degrees < 90.0 || is_last) {
             let ripple = TorqueRipple::ahead(degrees.to_radians());
@@ -110,7 +110,7 @@ fn a_second_axis_would_buy_little() {
         }
         println!("{line}");
     }
-    // Not nothing: the optimiser is at work.
+    // Not zero: this shows that the optimiser is at work.
     assert!((0.01..0.04).contains(&least_distortion), "current distortion {least_distortion}");
     assert!((0.05..0.16).contains(&calmer), "torque ripple {calmer}");
 }

@@ -1,4 +1,4 @@
-//! Starts and bounds by value.
+//! Values of starts and bounds.
 
 use super::*;
 
@@ -56,7 +56,7 @@ fn a_branchs_problem_is_its_own() {
     }
 }
 
-/// No start leads to a better optimum that the carrier halves can hold; and what is found has the anchor's fundamental.
+/// No start leads to a better optimum that the carrier halves can hold; and the one found has the anchor's fundamental.
 #[test]
 fn the_anchor_is_the_best_of_all_starts() {
     let branch = branch("opp3b");

@@ -1,4 +1,4 @@
-//! Constraints by finite differences, exactness, and optima of two angles beside a search along the line that the fundamental leaves.
+//! Constraints compared with finite differences, exactness, and optima of two angles compared with a search along the line that the fundamental leaves.
 
 use super::super::torque::TorqueRipple;
 use super::*;
@@ -75,7 +75,7 @@ fn exact_angles_keep_their_bounds() {
     }
 }
 
-/// The best of two angles: the second follows from the first by the fundamental; ever finer steps from a start.
+/// The best of two angles: the fundamental fixes the second one; the search takes ever finer steps from a start.
 fn by_search(first: f64, index: f64, start: f64, cost: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
     // first (1 − 2 cos a + 2 cos b) = index.
     let both = |a: f64| vec![a, (0.5 * (index / first - 1.0) + a.cos()).acos()];

@@ -1,4 +1,4 @@
-//! The fit of the distortion, by what a least square is.
+//! The fit of the distortion, checked by the property of least squares.
 
 use super::*;
 use crate::patterns::BRANCHES;
@@ -13,7 +13,7 @@ fn three_equations_are_solved() {
     }
 }
 
-/// The rest, as a share of the distortion, has no part along any of the three powers.
+/// The residual, as a share of the distortion, is orthogonal to each of the three powers.
 #[test]
 fn the_fit_leaves_least_squares() {
     let branch = BRANCHES.into_iter().find(|branch| branch.name == "opp5b").unwrap();

@@ -1,4 +1,4 @@
-//! Harmonics beside sums over all edges, integrals over the wave and finite differences.
+//! Harmonics compared with sums over all edges, integrals over the wave and finite differences.
 
 use super::*;
 use std::f64::consts::PI;
@@ -63,7 +63,7 @@ fn ripple_is_the_sum_of_the_harmonics_squares() {
 fn slopes_are_finite_differences() {
     const STEP: f64 = 1e-5;
     for (first, angles_rad) in WAVES {
-        // What stands there does not count.
+        // The previous content does not matter.
         let mut slopes = vec![7.0; angles_rad.len()];
         let whole = Waveform { first, angles_rad }.ripple(Some(&mut slopes));
         assert_eq!(whole, Waveform { first, angles_rad }.ripple(None));
