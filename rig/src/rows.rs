@@ -13,6 +13,26 @@ pub fn between<R: Timed>(rows: &[R], from_s: f64, to_s: f64) -> &[R] {
     &rows[first..last.max(first)]
 }
 
+/// Mean around each value, over so many steps to either side of it, at least half of one; of the outermost values the part within them counts.
+pub fn centred_means(values: &[f64], reach: impl Fn(usize) -> f64) -> Vec<f64> {
+    let mut sums = vec![0.0; values.len() + 1];
+    for (k, value) in values.iter().enumerate() {
+        sums[k + 1] = sums[k] + value;
+    }
+    let mean = |k: usize| {
+        let beyond = (reach(k) - 0.5).max(0.0);
+        let (whole, part) = (beyond.floor() as usize, beyond.fract());
+        let (first, last) = (k.saturating_sub(whole), (k + whole + 1).min(values.len()));
+        let ends = [first.checked_sub(1), Some(last)].into_iter().flatten().filter_map(|at| values.get(at));
+        let (sum, count) = ends
+            .fold((sums[last] - sums[first], (last - first) as f64), |(sum, count), value| {
+                (sum + part * value, count + part)
+            });
+        sum / count
+    };
+    (0..values.len()).map(mean).collect()
+}
+
 /// Mean over rows; 0 for none.
 pub fn mean<R>(rows: &[R], value: impl Fn(&R) -> f64) -> f64 {
     rows.iter().map(value).sum::<f64>() / rows.len().max(1) as f64

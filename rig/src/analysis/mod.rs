@@ -10,7 +10,7 @@ pub use step::{Step, StepResponse, step_response};
 pub use switches::{SwitchFigures, mode_switches, switch_verdicts};
 pub use transition::{FlyingStart, Transition, catch, transition};
 
-use crate::rows::{between, mean};
+use crate::rows::{between, centred_means};
 use crate::trace::{Recorded, Recording, Row, name_of};
 use crate::verdict::FALLS_SHORT;
 use serde::Serialize;
@@ -133,17 +133,12 @@ fn carrier_averaged(
     value: impl Fn(&Row) -> f64,
 ) -> Vec<(f64, f64)> {
     let half_width_s = 0.5 * carrier_s;
-    let rows = &recording.rows;
-    let step_s = if rows.len() > 1 { rows[1].t_s - rows[0].t_s } else { half_width_s };
-    let reach = (half_width_s / step_s).round() as usize;
-    let first = rows.partition_point(|row| row.t_s < from_s);
-    let last = rows.partition_point(|row| row.t_s < to_s - half_width_s);
-    (first..last)
-        .map(|k| {
-            let around = &rows[k.saturating_sub(reach)..(k + reach + 1).min(rows.len())];
-            (rows[k].t_s, mean(around, &value))
-        })
-        .collect()
+    let around = window(recording, from_s - carrier_s, to_s + carrier_s);
+    let step_s = if around.len() > 1 { around[1].t_s - around[0].t_s } else { half_width_s };
+    let values: Vec<_> = around.iter().map(value).collect();
+    let means = centred_means(&values, |_| half_width_s / step_s);
+    let within = |t_s: &f64| (from_s..to_s - half_width_s).contains(t_s);
+    around.iter().map(|row| row.t_s).zip(means).filter(|(t_s, _)| within(t_s)).collect()
 }
 
 /// The rows of a window at constant speed, shortened to whole turns of the stator field if one fits.

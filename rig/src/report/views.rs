@@ -2,6 +2,7 @@
 
 use super::scope::{Band, Over, Series, Style};
 use super::{Curve, Page, Panel};
+use crate::rows::centred_means;
 use crate::trace::{Recording, Row};
 use tractive::modulation::Mode;
 use tractive::recorder::Record;
@@ -204,23 +205,9 @@ fn carrier_means(rows: &[Row], carrier_hz: f64) -> Vec<f64> {
         [first, second, ..] => second.t_s - first.t_s,
         _ => return rows.iter().map(|row| row.te_nm).collect(),
     };
-    let mut sums = vec![0.0; rows.len() + 1];
-    for (k, row) in rows.iter().enumerate() {
-        sums[k + 1] = sums[k] + if row.te_nm.is_finite() { row.te_nm } else { 0.0 };
-    }
-    let mean = |(k, row): (usize, &Row)| {
-        let reach = 0.5 * carrier_s(row.mode, row.f1_hz.abs(), carrier_hz) / step_s;
-        // The part of the outermost rows that is within the period counts.
-        let (whole, part) = ((reach - 0.5).max(0.0).floor() as usize, (reach - 0.5).max(0.0).fract());
-        let (first, last) = (k.saturating_sub(whole), (k + whole + 1).min(rows.len()));
-        let ends = [first.checked_sub(1), Some(last)].into_iter().flatten().filter_map(|at| rows.get(at));
-        let (sum, count) = ends
-            .fold((sums[last] - sums[first], (last - first) as f64), |(sum, count), row| {
-                (sum + part * row.te_nm, count + part)
-            });
-        sum / count
-    };
-    rows.iter().enumerate().map(mean).collect()
+    let torques: Vec<_> =
+        rows.iter().map(|row| if row.te_nm.is_finite() { row.te_nm } else { 0.0 }).collect();
+    centred_means(&torques, |k| 0.5 * carrier_s(rows[k].mode, rows[k].f1_hz.abs(), carrier_hz) / step_s)
 }
 
 /// The period over which a mode's ripple is averaged, in s, at a stator frequency in Hz.
