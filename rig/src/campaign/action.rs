@@ -1,18 +1,18 @@
-//! The drive's action when a fault comes, and the time of it.
+//! The drive's action when a fault occurs, and the time of the fault.
 
 use serde::{Deserialize, Serialize};
 use tractive::named;
 
 named! {
-    /// The drive's action when the fault comes.
+    /// The drive's action when the fault occurs.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Action {
-        /// Torque along the speed.
+        /// Torque in the direction of rotation.
         Motoring => "motoring",
-        /// Torque against the speed.
+        /// Torque against the direction of rotation.
         Braking => "braking",
-        /// Pulses, and no torque.
+        /// Pulses, but no torque.
         Coasting => "coasting",
     }
 }
@@ -27,7 +27,7 @@ impl Action {
         }
     }
 
-    /// Torque wanted at a time of a run's stages, as a share of what is asked for.
+    /// Torque demanded at a time within a run's stages, as a share of the case's torque.
     pub fn share(self, stages: &Stages, t_s: f64) -> f64 {
         match t_s {
             t_s if t_s < stages.torque_s => 0.0,
@@ -41,9 +41,9 @@ impl Action {
 /// The stages of a run, in s from the recording's beginning.
 #[derive(Clone, Copy, Debug)]
 pub struct Stages {
-    /// The time at which the torque comes, before the recording.
+    /// The time at which the torque is applied, before the recording.
     pub torque_s: f64,
-    /// The time at which another torque is wanted: a fault that has not shown must not hide for ever.
+    /// The time at which the torque demand changes, so that a fault without effect so far does not stay hidden.
     pub turn_s: f64,
     /// End.
     pub end_s: f64,
@@ -51,11 +51,11 @@ pub struct Stages {
     pub aftermath_s: f64,
 }
 
-/// Before the recording, in s.
+/// Time before the recording, in s.
 pub const LEAD_S: f64 = 0.12;
-/// The time of the first fault, in s from the recording's beginning: not at a sample.
+/// The time of the first fault, in s from the recording's beginning; it does not fall on a sample.
 pub const FAULT_S: f64 = 0.005_037;
-/// Every case a little later than the one before, in s, so that faults come at all angles.
+/// Delay of each case's fault after the one before, in s, so that faults occur at all angles.
 const LATER_S: f64 = 0.000_173;
 const LATER_STEPS: usize = 23;
 

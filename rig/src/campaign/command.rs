@@ -17,7 +17,7 @@ use std::process::ExitCode;
 /// The name of the campaign of the listed cases.
 pub const FAULTS: &str = "faults";
 
-/// Runs the campaign. Exit code 1 where a case is uncaught, or the document is not up to date.
+/// Runs the campaign. Exit code 1 if a case is uncaught, or the document is not up to date.
 pub fn run(options: &CampaignOptions) -> Result<ExitCode> {
     if let Some(minutes) = options.healthy {
         return healthy::command::run(minutes, options);
@@ -92,7 +92,7 @@ fn cases(campaign: &Campaign, options: &CampaignOptions) -> Result<Vec<Case>> {
     Ok(cases)
 }
 
-/// Writes and prints what came of the cases; `true` if none is uncaught.
+/// Writes and prints the outcomes of the cases; `true` if none is uncaught.
 fn finish(outcomes: &[Outcome], given: serde_json::Value, out: &Path, json: bool) -> Result<bool> {
     report::write(outcomes, given, out)?;
     if json {
@@ -111,7 +111,7 @@ fn finish(outcomes: &[Outcome], given: serde_json::Value, out: &Path, json: bool
     Ok(lost.is_empty())
 }
 
-/// The files and the text of `campaign` without shards, of shards that are merged; `true` if nothing is uncaught.
+/// Writes from merged shards the files and the text that `campaign` gives without shards; `true` if nothing is uncaught.
 pub fn merged(merged: &Merged, out: &Path, json: bool) -> Result<bool> {
     finish(&merged.read()?, merged.plan.configuration.clone(), out, json)
 }

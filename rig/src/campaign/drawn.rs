@@ -2,7 +2,7 @@
 
 use super::Outcome;
 
-/// A dimension: its range, and the value that it has where nothing is odd about it.
+/// A dimension: its range, and its value if nothing is odd about it.
 #[derive(Clone, Copy, Debug)]
 pub struct Dimension {
     /// Its name, with its unit.
@@ -11,7 +11,7 @@ pub struct Dimension {
     pub low: f64,
     /// The highest value.
     pub high: f64,
-    /// The value of a sound drive; `None` where any is as good as another.
+    /// The value of a sound drive; `None` if any is as good as another.
     pub sound: Option<f64>,
 }
 
@@ -29,9 +29,9 @@ pub struct Drawn {
     pub run: usize,
     /// The seed of its noise.
     pub seed: u64,
-    /// The modes that it went through, with > between.
+    /// The modes that it went through, separated by >.
     pub modes: String,
-    /// The source of the current reference when the fault came, or that there were no pulses.
+    /// The source of the current reference when the fault occurred, or a note that there were no pulses.
     pub region: String,
     /// Its values, in the order of the dimensions.
     pub values: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Faults with their names and rules, whatever a drive's faults are made of.
+//! Faults with their names and rules, whatever the type of a drive's faults.
 
 use super::judge::Rule;
 use crate::inject::ControlFault;
@@ -22,14 +22,14 @@ pub struct Named<C> {
 pub struct Faults<C>(pub Vec<Named<C>>);
 
 impl<C> Faults<C> {
-    /// Nothing at all, which nobody may feel; the others come behind it.
+    /// A list that begins with no fault at all, which must not be noticeable; the others follow it.
     pub fn beginning_with(nothing: impl Into<C>) -> Self {
         let mut list = Self(Vec::new());
         list.add("none", nothing, &[], Some(UNFELT), true);
         list
     }
 
-    /// One more, which the drive may call by these names, or go on with at a mean torque error of this share.
+    /// Adds a fault that the drive may call by these names, or ride through with a mean torque error of this share.
     pub fn add(
         &mut self,
         name: &str,
@@ -42,7 +42,7 @@ impl<C> Faults<C> {
         self.0.push(Named { name: name.to_owned(), cause: cause.into(), rule, fast });
     }
 
-    /// Faults of the control interrupt, and a torque demand that is none.
+    /// Adds the faults of the control interrupt, and a torque demand that is not a number.
     pub fn add_control<K: Into<C>>(&mut self, control: fn(ControlFault) -> K, demand_not_finite: K) {
         self.add("control-late", control(ControlFault::Late(100)), &[Fault::ControlDeadline], None, true);
         self.add("commands-lost", control(ControlFault::Stopped), &[Fault::StaleCommand], None, true);
@@ -50,12 +50,12 @@ impl<C> Faults<C> {
     }
 }
 
-/// Mean torque error where a fault must not be felt, as a share of the largest torque.
+/// Mean torque error if a fault must not be noticeable, as a share of the largest torque.
 pub const UNFELT: f64 = 0.03;
 /// The share by which a sensor bends the torque.
 pub const BENT: f64 = 0.1;
 
-/// Sizes of what a current sensor does wrong.
+/// Sizes of a current sensor's errors.
 #[derive(Clone, Copy, Debug)]
 pub struct SensorErrors {
     /// Offset, in A.
@@ -68,11 +68,11 @@ pub struct SensorErrors {
     pub range_a: f64,
 }
 
-/// The failure of a current sensor, the names that it may get, and the torque error where it may pass.
+/// The failure of a current sensor, the names that it may get, and the torque error with which it may pass.
 pub type SensorFailure = (&'static str, CurrentFault, &'static [Fault], Option<f64>);
 
 impl SensorErrors {
-    /// The errors of sensors for so many times the currents.
+    /// The errors of sensors for this multiple of the currents.
     pub const fn times(&self, scale: f64) -> Self {
         let Self { offset_a, noise_a, range_a, .. } = *self;
         Self { offset_a: scale * offset_a, noise_a: scale * noise_a, range_a: scale * range_a, ..*self }

@@ -1,8 +1,8 @@
-//! The fault campaign: everything that can go wrong, in every mode, at every speed, motoring, braking and coasting; what the drive
-//! made of it, and whether that is good enough.
+//! The fault campaign: everything that can go wrong, in every mode, at every speed, motoring, braking and coasting; how the drive
+//! responded, and whether that is good enough.
 //!
-//! A case is one run of a drive's own tasks on its bench: it settles, the fault comes, and if the drive has not stopped by then,
-//! another torque is wanted, so that nothing stays hidden. [`judge`] says what is good enough, [`crate::ablation`] switches one
+//! A case is one run of a drive's own tasks on its bench: it settles, the fault occurs, and if the drive has not stopped by then,
+//! another torque is demanded, so that nothing stays hidden. [`judge`] decides what is good enough; [`crate::ablation`] switches one
 //! protection off to see which cases are lost.
 
 mod action;
@@ -49,7 +49,7 @@ impl Case {
 /// The machines of both systems, with one protection off or none.
 pub struct Campaign {
     traction: traction::Drive,
-    /// `None` where the two-level drive's machine is the user's own.
+    /// `None` if the two-level drive's machine is the user's own.
     dual: Option<dual::Drive>,
 }
 
@@ -74,7 +74,7 @@ impl Campaign {
         self.traction.most_rpm()
     }
 
-    /// Every case; of the fast ones each fault in each mode once at least.
+    /// Every case; the fast ones are each fault in each mode at least once.
     pub fn cases(&self, fast: bool) -> Vec<Case> {
         let traction = self.traction.cases(fast).into_iter().map(|case| Case::Traction(Box::new(case)));
         let dual = self.dual.iter().flat_map(|_| dual::cases(fast));
@@ -89,7 +89,7 @@ impl Campaign {
         }
     }
 
-    /// Runs many, on all cores, in their order; `after_each` is told of every one that is done.
+    /// Runs many cases on all cores, keeping their order; `after_each` is called after every one.
     pub fn run_all(&self, cases: &[Case], after_each: impl Fn() + Sync) -> Result<Vec<Outcome>> {
         let run = |case: &Case| {
             let outcome = self.run(case).with_context(|| case.name());

@@ -15,7 +15,7 @@ pub struct Outcome {
     pub system: SystemName,
     /// The fault.
     pub fault: String,
-    /// Mode of the pulses when it did; the ZS9's scheme.
+    /// Mode of the pulses when the fault occurred; the ZS9's scheme.
     pub mode: String,
     /// Speed then, in r/min.
     pub speed_rpm: f64,
@@ -31,7 +31,7 @@ pub struct Outcome {
     pub carrier_periods: Option<f64>,
     /// The same time, in ms.
     pub time_ms: Option<f64>,
-    /// From the fault itself, in ms: a sensor that is stuck shows where the current goes elsewhere.
+    /// Time from the fault itself, in ms: a stuck sensor shows once the current goes elsewhere.
     pub since_fault_ms: Option<f64>,
     /// Largest phase current from the fault until the gates were safe, in A.
     pub current_until_a: f64,
@@ -51,9 +51,9 @@ pub struct Outcome {
     pub uc_after_v: Option<f64>,
     /// The limit.
     pub uc_limit_v: Option<f64>,
-    /// Lowest i_d from the fault on, in A; the ZS9's of both motors.
+    /// Lowest i_d from the fault on, in A; for the ZS9 of both motors.
     pub lowest_id_a: f64,
-    /// Mean torque less demand where the drive went on, in N·m: the worst of both demands, and for the ZS9 of both motors.
+    /// Mean torque less demand if the drive went on, in N·m: the worst of both demands, and for the ZS9 of both motors.
     pub torque_error_nm: f64,
     /// The reason why it is uncaught; empty otherwise.
     pub why: String,
@@ -93,7 +93,7 @@ pub struct Seen {
     pub trip: Option<Trip>,
     /// Mean torque less demand, in N·m: the worst of both demands, and for the ZS9 of both motors.
     pub torque_error_nm: f64,
-    /// Length of a tick of what was observed, in s.
+    /// Length of a tick of the observations, in s.
     pub tick_s: f64,
     /// Length of a carrier at the fault's instant, in s.
     pub carrier_s: f64,
@@ -106,7 +106,7 @@ impl Seen {
     }
 }
 
-/// The consequences that it may have.
+/// The consequences that a fault may have.
 #[derive(Clone, Debug)]
 pub struct Allowed {
     /// The longest time from a fault's first effect until the gates are safe, in s.
@@ -117,13 +117,13 @@ pub struct Allowed {
     pub udc_v: f64,
     /// The ZS9's capacitor voltage with safe gates, in V.
     pub uc_v: Option<f64>,
-    /// Mean torque error where a share of it is allowed, in N·m.
+    /// Torque of which the fault's rule allows a share as mean torque error, in N·m.
     pub torque_nm: f64,
     /// Mean torque error that the case's conditions explain, in N·m.
     pub explained_nm: f64,
-    /// Further bounds where the drive stopped.
+    /// Further bounds if the drive stopped.
     pub stopped: Vec<Bounded>,
-    /// Further bounds where it went on.
+    /// Further bounds if it went on.
     pub went_on: Vec<Bounded>,
 }
 

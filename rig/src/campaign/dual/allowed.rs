@@ -31,7 +31,7 @@ impl Drive {
         Allowed {
             longest_s: self.longest_s(case, seen),
             current_a,
-            // The source is what it is; the capacitors decide.
+            // The source is given; the capacitors decide.
             udc_v: 2.0 * uc_v,
             uc_v: Some(uc_v),
             torque_nm: parameters.max_torque_nm,
@@ -51,8 +51,8 @@ impl Drive {
         }
     }
 
-    /// The longest time from a fault's first effect until the gates are safe, in s: three carriers, or, where a fault shows with the
-    /// rotor's angle, half an electrical turn; a capacitor that is overcharged and a rotor that runs away are found by their levels.
+    /// The longest time from a fault's first effect until the gates are safe, in s: three carriers, or half an electrical turn if the fault
+    /// shows with the rotor's angle; an overcharged capacitor and a rotor that runs away are found by their levels.
     fn longest_s(&self, case: &Case, seen: &Seen) -> f64 {
         let carriers_s = 3.0 * seen.carrier_s;
         let pole_pairs = self.machine.folder.parameters.pole_pairs;
@@ -60,7 +60,7 @@ impl Drive {
             Cause::Bench(Kind::Current(motor, ..) | Kind::Angle(motor, _)) => {
                 carriers_s.max(half_turn_s(case.point.speeds_rpm[motor], pole_pairs))
             }
-            // The currents are made all the same, and only the voltage tells, whose volt-seconds have to add up.
+            // The currents are produced all the same, so only the voltage tells, and its volt-seconds have to add up.
             Cause::Bench(Kind::SourceSwitchOpen) if seen.names(Fault::VoltageUnexplained) => STAGES.end_s,
             Cause::Bench(Kind::Gate(..)) => STUCK_S,
             Cause::Bench(Kind::Control(ControlFault::Stopped)) => carriers_s + STALE_S,
@@ -70,7 +70,7 @@ impl Drive {
     }
 }
 
-/// Until a gate that is stuck has made a difference to the feedback, in s: five carriers.
+/// Time until a stuck gate has made a difference to the feedback, in s: five carriers.
 const STUCK_S: f64 = 5e-4;
 /// The largest age of a command, in s.
 const STALE_S: f64 = 5e-4;
@@ -79,8 +79,8 @@ const TRACKING_S: f64 = 0.5e-3;
 /// The rise of a capacitor between a sample at its trip level and gates that are off, in V: 300 A for 175 µs.
 const RISE_V: f64 = 300.0 * 175e-6 / ZNetwork::ZS9.capacitance_f;
 
-/// The highest capacitor voltage that must be expected once the gates are off, in V: the network's own oscillation with the energies of
-/// the motors on top.
+/// The highest capacitor voltage to expect once the gates are off, in V: that of the network's own oscillation, plus the energies of
+/// the motors.
 fn forced_uc_v(observed: &Observed) -> f64 {
     let stored = &observed.stored;
     // Both capacitors share it.

@@ -1,4 +1,4 @@
-//! The operating points at which the faults of the ZS9 come.
+//! The operating points at which the faults of the ZS9 occur.
 
 use super::faults::{Cause, faults};
 use crate::campaign::Action;
@@ -28,7 +28,7 @@ const POINTS: [Point; 5] = [
 /// Schemes of the fast campaign, one after the other; the full one has every scheme.
 pub(super) const SCHEMES: [Scheme; 4] = [Scheme::S, Scheme::Rs, Scheme::Rthd, Scheme::Zvo];
 
-/// From where a rotor runs away, in r/min.
+/// Speed from which on a rotor runs away, in r/min.
 const RUNAWAY_FROM_RPM: f64 = 1_200.0;
 
 /// One run.
@@ -50,7 +50,7 @@ impl Case {
     }
 }
 
-/// Every case; of the fast ones each fault of each kind.
+/// Every case; the fast ones are each fault of each kind.
 pub fn cases(fast: bool) -> Vec<Case> {
     let mut list = Vec::new();
     for fault in faults() {

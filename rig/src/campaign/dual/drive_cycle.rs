@@ -1,4 +1,4 @@
-//! Drives that are written down as what happens when, instead of cases.
+//! Drive cycles written as lists of timed events, instead of cases.
 
 use super::Drive;
 use crate::bench::{Flaws, Observed, Simulated, Tick};
@@ -21,16 +21,16 @@ use tractive::time::Instant;
 pub enum Script {
     /// It follows torques, each from its time on (N·m, and whether the rate is limited), at a prescribed speed.
     Torque {
-        /// In r/min, straight lines between.
+        /// In r/min, linear in between.
         speed_rpm: Vec<(f64, f64)>,
         /// Demands.
         torque_nm: Vec<(f64, (f64, bool))>,
     },
     /// It follows a speed, its rotor free and loaded.
     Speed {
-        /// Wanted, in r/min, straight lines between.
+        /// Demanded speeds, in r/min, linear in between.
         wanted_rpm: Vec<(f64, f64)>,
-        /// Against forward rotation, each from its time on.
+        /// Loads against forward rotation, each from its time on.
         load_nm: Vec<(f64, f64)>,
     },
 }
@@ -51,7 +51,7 @@ impl Script {
     }
 }
 
-/// A drive written down as what happens when.
+/// A drive cycle written as timed events.
 #[derive(Clone, Debug)]
 pub struct DriveCycle {
     /// The upper motor, the lower one.
@@ -103,7 +103,7 @@ impl Drive {
         let bench = Bench::new(self.plant(speeds, PlantSettings::default()), Box::new(operator), settings);
         let mut bench = bench.following(course).beginning_at(origin);
         let mut tasks = self.tasks(Instant(origin as u32));
-        // Once it has stopped there is nothing to see.
+        // After the drive has stopped there is nothing to see.
         tasks.drive(&mut bench, |bench| bench.observed.safe.is_none())?;
         Ok(CycleResult {
             observed: bench.observed,

@@ -20,8 +20,8 @@ pub enum Cause {
 /// The errors of the current sensors; their converters' range is a quarter above the trip level.
 const SENSORS: SensorErrors = SensorErrors { offset_a: 25.0, scale: 1.6, noise_a: 12.0, range_a: 138.1 };
 
-/// Mean torque error where the machine differs by a fifth from its map, as a share of the largest torque. At 1,000 r/min a fifth more
-/// flux needs more voltage than there is; the torque is then what is left.
+/// Mean torque error if the machine differs by a fifth from its map, as a share of the largest torque. At 1,000 r/min a fifth more
+/// flux needs more voltage than is available; the torque is then what remains possible.
 const ANOTHER_MACHINE: f64 = 0.45;
 
 impl From<Kind> for Cause {
@@ -80,12 +80,12 @@ fn sensors(list: &mut Faults<Cause>) {
 fn source(list: &mut Faults<Cause>) {
     const SOURCE: &[Fault] = &[Fault::SourceUndervoltage];
     const HIGH: &[Fault] = &[Fault::CapacitorOvervoltage, Fault::DutyRange];
-    // Without the switch the link is not what capacitors and source say.
+    // Without the switch the link voltage is not the one that capacitors and source imply.
     const OPEN: &[Fault] = &[Fault::CapacitorOvervoltage, Fault::DutyRange, Fault::VoltageUnexplained];
     const CUT: &[Fault] = &[Fault::SourceUndervoltage, Fault::CapacitorOvervoltage, Fault::DutyRange];
     list.add("source-low", Kind::SourceLow, SOURCE, None, true);
     list.add("source-high", Kind::SourceHigh, HIGH, None, true);
-    // Where a motor gives what the other losses take, nothing changes.
+    // If a motor supplies what the other losses take, nothing changes.
     list.add("source-lost", Kind::SourceLost, CUT, Some(UNFELT), true);
     list.add("source-shorted", Kind::SourceShort, SOURCE, None, true);
     list.add("source-swings", Kind::SourceSwings(30.0, 50.0), HIGH, Some(UNFELT), true);

@@ -34,11 +34,11 @@ use tractive::ports::MotorDemand;
 use tractive::time::Instant;
 
 const CARRIER_HZ: u32 = 10_000;
-/// Share of the torque envelope that is asked for.
+/// Share of the torque envelope that is demanded.
 const SHARE: f64 = 0.6;
-/// The aftermath is twelve periods of the network's oscillation.
+/// The aftermath covers twelve periods of the network's oscillation.
 const STAGES: Stages = Stages { torque_s: -0.08, turn_s: 0.07, end_s: 0.16, aftermath_s: 0.04 };
-/// Means of the torque are over this much time, in s.
+/// Time over which the torque is averaged, in s.
 const MEAN_S: f64 = 0.03;
 /// The acceleration of a rotor that runs away, in r/min per s.
 const RUNAWAY_RPM_S: f64 = 6_000.0;
@@ -167,7 +167,7 @@ impl Drive {
     }
 }
 
-/// Mean torque less demand before an instant, in N·m, of the motor that is worse off.
+/// Mean torque less demand before an instant, in N·m, of the worse motor.
 fn torque_error_nm(rows: &[Row], before_s: f64) -> f64 {
     let window: Vec<_> =
         rows.iter().filter(|row| row.t_s < before_s && row.t_s > before_s - MEAN_S).collect();

@@ -1,4 +1,4 @@
-//! `campaign --healthy`: minutes in pieces, and what tripped.
+//! `campaign --healthy`: drives the minutes in pieces, and reports what tripped.
 
 use super::{Driven, dual as random_dual, traction as random_traction};
 use crate::campaign::options::CampaignOptions;
@@ -68,7 +68,7 @@ impl Course<'_> {
     }
 }
 
-/// Drives; exit code 1 where something trips.
+/// Drives; exit code 1 if something trips.
 pub fn run(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
     let pieces = (minutes / PIECE_MIN).ceil() as usize;
     let mut systems = report::SYSTEMS.map(|(system, _)| system).to_vec();
@@ -109,7 +109,7 @@ pub fn run(minutes: f64, options: &CampaignOptions) -> Result<ExitCode> {
     Ok(if tell(&driven, minutes, options.json)? { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// Prints what came of the pieces; `true` if nothing tripped.
+/// Prints the outcome of the pieces; `true` if nothing tripped.
 fn tell(driven: &[Piece], minutes: f64, json: bool) -> Result<bool> {
     let mut totals = BTreeMap::new();
     for (system, _) in report::SYSTEMS {
@@ -138,7 +138,7 @@ fn tell(driven: &[Piece], minutes: f64, json: bool) -> Result<bool> {
     Ok(driven.iter().all(|piece| piece.tripped.is_empty()))
 }
 
-/// Writes campaign.csv of shards that are merged, and prints what `campaign --healthy` prints; `true` if nothing tripped.
+/// Writes campaign.csv of merged shards, and prints what `campaign --healthy` prints; `true` if nothing tripped.
 pub fn merged(merged: &Merged, out: &Path, json: bool) -> Result<bool> {
     write_text(&out.join("campaign.csv"), &merged.csv())?;
     let minutes = merged.plan.configuration.get("minutes").and_then(serde_json::Value::as_f64);

@@ -10,11 +10,11 @@ use tractive::nine_switch::Scheme;
 
 /// Highest speed, in r/min: the cycle's cruise.
 const MOST_RPM: f64 = 1_300.0;
-/// Steepest change of speed where the torque is wanted, in r/min per s.
+/// Steepest change of speed if the torque is demanded, in r/min per s.
 const STEEPEST_RPM_S: f64 = 3_000.0;
-/// Steepest change of a speed that is wanted, in r/min per s: half of what full torque does to the rotor.
+/// Steepest change of a demanded speed, in r/min per s: half of what full torque does to the rotor.
 const WANTED_RPM_S: f64 = 5_000.0;
-/// Largest load, in N·m: half of what is there at the highest speed.
+/// Largest load, in N·m: half of what is available at the highest speed.
 const LOAD_NM: f64 = 45.0;
 /// Range of the source, in V: a tenth to either side; and its largest jump.
 const SOURCE_V: (f64, f64) = (320.0, 460.0);
@@ -66,7 +66,7 @@ fn by_speed(random: &mut StdRng, duration_s: f64) -> Script {
 /// Step of the trace, in s.
 const STEP_S: f64 = 1e-3;
 
-/// Drives it; the trip in the end is what must not be.
+/// Drives the cycle, which must not end in a trip.
 pub fn drive(drive: &Drive, duration_s: f64, seed: u64) -> Result<CycleResult> {
     let trip_current_a = drive.machine.folder.parameters.trip_current_a;
     drive.cycle(cycle(drive, duration_s, seed), flaws(trip_current_a, NOISE_A, seed), STEP_S, 0)

@@ -1,4 +1,4 @@
-//! Hard but healthy driving, at random: what must not trip.
+//! Hard but healthy driving, at random, which must not trip.
 
 pub mod command;
 pub mod dual;
@@ -14,11 +14,11 @@ use tractive::protection::Trip;
 pub struct Driven {
     /// Extremes of the cycle.
     pub peaks: Peaks,
-    /// The trip, where and in which mode, if there was one.
+    /// The trip, with its place and mode, if there was one.
     pub tripped: Option<String>,
 }
 
-/// Sensors as they are: 12 bits over a quarter more than the trip level, and this much noise, in A rms.
+/// Realistic sensors: 12 bits over a range a quarter above the trip level, and this much noise, in A rms.
 fn flaws(trip_current_a: f64, noise_a: f64, seed: u64) -> Flaws {
     Flaws { adc_bits: Some(12), adc_full_scale_a: 1.25 * trip_current_a, noise_a, seed, ..Flaws::default() }
 }
@@ -55,7 +55,7 @@ fn torques(random: &mut StdRng, most_nm: f64, (from_s, until_s): (f64, f64)) -> 
     torques
 }
 
-/// A voltage that goes elsewhere within a range (V), by so many volts at the most.
+/// A voltage that jumps within a range (V), by this many volts at most.
 fn jumped(random: &mut StdRng, from_v: f64, (least_v, most_v): (f64, f64), jump_v: f64) -> f64 {
     random.random_range((from_v - jump_v).max(least_v)..(from_v + jump_v).min(most_v))
 }

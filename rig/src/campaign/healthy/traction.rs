@@ -9,8 +9,8 @@ use tractive::modulation::Mode;
 
 /// Steepest change of speed, in r/min per s: what the machine does to its own rotor.
 const STEEPEST_RPM_S: f64 = 3_000.0;
-/// The line's voltages, in V, and by how much it jumps at most: what the drive is to bear under full load. Jumps of 600 V make the square
-/// wave trip now and then, by a hundredth over the level.
+/// The line's voltages, in V, and its largest jump: what the drive has to bear under full load. With jumps of 600 V the square wave trips
+/// now and then, by a hundredth over the level.
 const LINE_V: (f64, f64) = (1_150.0, 1_750.0);
 const LINE_JUMP_V: f64 = 200.0;
 
@@ -43,7 +43,7 @@ pub fn cycle(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> DriveCy
 /// Noise of the current sensors, in A rms.
 const NOISE_A: f64 = 0.5;
 
-/// Drives it; the trip in the end is what must not be.
+/// Drives the cycle, which must not end in a trip.
 pub fn drive(drive: &Drive, duration_s: f64, seed: u64, blocks: bool) -> Result<CycleResult> {
     let trip_current_a = drive.machine.folder.parameters.trip_current_a;
     drive.cycle(cycle(drive, duration_s, seed, blocks), flaws(trip_current_a, NOISE_A, seed))

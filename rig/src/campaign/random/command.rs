@@ -1,4 +1,4 @@
-//! `campaign --random`: draws, runs, tells what was covered, and makes what fails small.
+//! `campaign --random`: draws and runs cases, reports what was covered, and minimises the failures.
 
 use super::{Hypercube, coverage, minimise};
 use crate::campaign::drawn::Run;
@@ -26,7 +26,7 @@ struct Configuration {
     patterns: PatternsName,
 }
 
-/// Failures that are made small, at most: each takes some dozens of runs.
+/// Largest number of failures that are minimised: each takes some dozens of runs.
 const SMALL: usize = 5;
 
 /// The drive, and what is drawn for it.
@@ -37,7 +37,7 @@ pub struct Random {
 }
 
 impl Random {
-    /// So many runs with a seed.
+    /// The given number of runs with a seed.
     pub fn new(runs: usize, seed: u64, patterns: PatternsName) -> Result<Self> {
         let name = format!("{RANDOM} {seed} {runs}");
         let drive = Drive::new(None)?.with(patterns);
@@ -52,7 +52,7 @@ impl Random {
         self.drive.run_values(run, &values, seed(&self.name, run as u64))
     }
 
-    /// A run's values of which as few as possible are odd, so that it is still uncaught.
+    /// A run's values, with as few odd ones as possible, so that it is still uncaught.
     pub fn smallest(&self, run: &Run) -> Result<Run> {
         let drawn = &run.drawn;
         let is_uncaught = |values: &[f64]| -> Result<bool> {
@@ -64,7 +64,7 @@ impl Random {
     }
 }
 
-/// Runs the campaign. Exit code 1 where a run is uncaught, or the document is not up to date.
+/// Runs the campaign. Exit code 1 if a run is uncaught, or the document is not up to date.
 pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
     ensure!(runs > 0, "--random 0: must be at least 1");
     let random = Random::new(runs, options.seed, options.patterns(None))?;
@@ -110,7 +110,7 @@ pub fn run(runs: usize, options: &CampaignOptions) -> Result<ExitCode> {
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// Writes campaign.csv and prints the coverage; `true` if nothing is uncaught. What is uncaught is made small.
+/// Writes campaign.csv and prints the coverage; `true` if nothing is uncaught. Uncaught runs are minimised.
 fn finish(merged: &Merged, out: &Path) -> Result<bool> {
     write_text(&out.join("campaign.csv"), &merged.csv())?;
     let runs = Run::of(merged)?;
@@ -127,12 +127,12 @@ fn finish(merged: &Merged, out: &Path) -> Result<bool> {
     Ok(lost.is_empty())
 }
 
-/// The same of shards that are merged.
+/// The same for merged shards.
 pub fn merged(merged: &Merged, out: &Path) -> Result<bool> {
     finish(merged, out)
 }
 
-/// A run in words: its outcome, and the values that are not a sound drive's.
+/// A run in words: its outcome, and the values that differ from a sound drive's.
 fn words(run: &Run) -> String {
     let Run { outcome, drawn } = run;
     let odd =

@@ -6,7 +6,7 @@ use crate::campaign::{Action, Outcome};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// Counts by something, of each action.
+/// Counts for each name, by action.
 type Actions<'a> = BTreeMap<&'a str, [usize; 3]>;
 
 /// The number of times that each mode, region, border, fault and safe state was met, as Markdown.
@@ -60,7 +60,7 @@ pub fn coverage(runs: &[Run]) -> String {
     text
 }
 
-/// False trips, and numbers that are none.
+/// False trips, and numbers that are not finite.
 fn zeros(outcomes: &[Outcome]) -> String {
     let sound: Vec<_> = outcomes.iter().filter(|outcome| outcome.fault == "none").collect();
     let false_trips = sound.iter().filter(|outcome| !outcome.named.is_empty()).count();

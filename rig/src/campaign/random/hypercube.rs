@@ -1,4 +1,4 @@
-//! A Latin hypercube: of so many runs each takes another slice of every dimension.
+//! A Latin hypercube: each run takes a different slice of every dimension.
 
 use crate::shards::seed;
 use rand::rngs::StdRng;
@@ -12,7 +12,7 @@ pub struct Hypercube {
 }
 
 impl Hypercube {
-    /// Of a campaign with this name, for `runs` runs in so many dimensions.
+    /// The hypercube of a campaign with this name, for `runs` runs in this many dimensions.
     pub fn new(name: &str, runs: usize, dimensions: usize) -> Self {
         let slices = (0..dimensions).map(|dimension| {
             let mut order: Vec<u32> = (0..).take(runs).collect();
@@ -23,7 +23,7 @@ impl Hypercube {
         Self { name: name.to_owned(), slices: slices.collect() }
     }
 
-    /// The point of a run, each coordinate from 0 (included) to 1; `None` of a run that there is not.
+    /// The point of a run, each coordinate from 0 (included) to 1; `None` if there is no such run.
     pub fn point(&self, run: usize) -> Option<Vec<f64>> {
         let mut random = StdRng::seed_from_u64(seed(&self.name, run as u64));
         let within = |order: &Vec<u32>| {

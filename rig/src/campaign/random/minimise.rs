@@ -1,11 +1,11 @@
-//! A failing case made as small as it still fails.
+//! The minimisation of a failing case, as far as it still fails.
 
 use crate::campaign::drawn::Dimension;
 
-/// Halvings of what is left of a value's distance from the sound one.
+/// Number of times that a value's remaining distance from its sound value is halved.
 const HALVINGS: usize = 5;
 
-/// The values of which as few as possible differ from the sound ones, as little as possible, so that they still fail.
+/// The values that still fail although as few of them as possible differ from the sound ones, and by as little as possible.
 pub fn minimise<E>(
     dimensions: &[Dimension],
     values: &[f64],

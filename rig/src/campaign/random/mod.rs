@@ -1,5 +1,5 @@
-//! Runs with machine, line, flaws, trajectory and fault at random, by a Latin hypercube; and whatever fails made as small as it still
-//! fails.
+//! Runs whose machine, line, flaws, trajectory and fault are drawn at random by a Latin hypercube; a run that fails is minimised as far as it
+//! still fails.
 
 pub mod command;
 mod coverage;

@@ -62,12 +62,12 @@ fn replaced(text: &str, part: Part, new: &str) -> Result<String> {
     Ok(format!("{before}{new}\n{after}"))
 }
 
-/// Renews the generated part of a document, or says whether it is as it would be written.
+/// Renews the generated part of a document, or says whether it is up to date.
 pub fn renew(path: &Path, outcomes: &[Outcome], part: Part, only_check: bool) -> Result<bool> {
     renew_with(path, part, &part.text(outcomes), only_check)
 }
 
-/// The same with a text that is made already.
+/// The same with a text that is already made.
 pub fn renew_with(path: &Path, part: Part, text: &str, only_check: bool) -> Result<bool> {
     let named = || path.display().to_string();
     let before = std::fs::read_to_string(path).with_context(named)?;

@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// All cases of something in one line.
+/// All cases that have something in common, in one line.
 #[derive(Clone, Debug, Serialize)]
 pub struct Line {
     /// The system.
@@ -24,7 +24,7 @@ pub struct Line {
     pub carrier_periods: f64,
     /// The same, in ms.
     pub time_ms: f64,
-    /// Largest phase current until the gates were safe, in A, or over the whole case where the drive went on.
+    /// Largest phase current until the gates were safe, in A, or over the whole case if the drive went on.
     pub current_until_a: f64,
     /// And after that.
     pub current_after_a: f64,
@@ -36,9 +36,9 @@ pub struct Line {
     pub uc_until_v: Option<f64>,
     /// And after that.
     pub uc_after_v: Option<f64>,
-    /// The largest phase current over what it may be, of all cases.
+    /// The largest ratio of a phase current to its limit, of all cases.
     pub current_share: f64,
-    /// The highest voltage with safe gates over what is forced then, or over the trip level where that is more; the ZS9's of a capacitor.
+    /// The highest ratio of the voltage with safe gates to the forced one, or to the trip level if that is higher; for the ZS9 a capacitor's.
     pub voltage_share: f64,
 }
 
@@ -103,7 +103,7 @@ pub fn by_safe_state(outcomes: &[Outcome]) -> Vec<Line> {
     lines(&stopped, |outcome| format!("{:.0} r/min, {}", outcome.speed_rpm.abs(), outcome.safe_state))
 }
 
-/// A column behind the heading: its head, and what a line has in it.
+/// A column after the heading: its head, and its content for a line.
 type Column = (&'static str, fn(&Line) -> String);
 
 const COLUMNS: [Column; 16] = [

@@ -35,7 +35,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Of some.
+    /// The tally of some outcomes.
     fn of<'a>(outcomes: impl Iterator<Item = &'a Outcome>) -> Self {
         outcomes.fold(Self::default(), |mut tally, outcome| {
             tally.cases += 1;
@@ -54,7 +54,7 @@ impl Outcome {
         self.current_until_a.max(self.current_after_a)
     }
 
-    /// A failed device forces the current: true where it does.
+    /// True if a failed device forces the current.
     fn is_forced(&self) -> bool {
         self.fault.ends_with("-shorted")
     }

@@ -12,17 +12,17 @@ pub struct Total {
     /// The counts of their ends.
     #[serde(flatten)]
     pub tally: Tally,
-    /// The phase current that was allowed in the very case whose current, not forced by a failed device, was largest, in A.
+    /// The allowed phase current, in A, of the case with the largest current that was not forced by a failed device.
     pub current_limit_a: f64,
     /// The worst case of each quantity, by name.
     #[serde(flatten)]
     pub worst: BTreeMap<&'static str, Worst>,
 }
 
-/// A quantity of which the worst case is told: its name, what a sentence calls it, its unit, its value where a case has one.
+/// A quantity whose worst case is reported: its name, its name in a sentence, its unit, and its value if a case has one.
 type Quantity = (&'static str, &'static str, &'static str, fn(&Outcome) -> Option<f64>);
 
-/// Things of which the worst cases are told, in their order.
+/// Quantities whose worst cases are reported, in their order.
 const QUANTITIES: [Quantity; 9] = [
     ("worst_carrier_periods", "longest until the gates were safe", " carrier periods", |of| {
         of.carrier_periods
@@ -44,10 +44,10 @@ const QUANTITIES: [Quantity; 9] = [
 /// The quantity for which [`Total::current_limit_a`] is the limit.
 const LIMITED: &str = "worst_current_a";
 
-/// The largest value and where it was; nothing where there is none.
+/// The largest value and its case; nothing if there is none.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Worst {
-    /// It.
+    /// The value.
     pub value: f64,
     /// The case.
     pub case: String,
@@ -64,7 +64,7 @@ fn worst<'a>(outcomes: impl Iterator<Item = &'a Outcome>, value: impl Fn(&Outcom
     })
 }
 
-/// Of one system; `None` without cases.
+/// The total of one system; `None` without cases.
 pub fn total(outcomes: &[Outcome], system: &str) -> Option<Total> {
     let of = || outcomes.iter().filter(|outcome| outcome.system == system);
     of().next()?;

@@ -15,16 +15,16 @@ impl Drive {
         let parameters = &self.machine.folder.parameters;
         let observed = &seen.observed;
         let flaws = &case.conditions.flaws;
-        // Where the drive reads its trip levels.
+        // True values at which the drive reads its trip levels.
         let trip_a = parameters.trip_current_a / (1.0 + flaws.current_gain);
         let over_v = parameters.trip_dc_over_v / (1.0 + flaws.udc_gain);
-        // Between two samples a current rises in proportion to the voltage of the link: half the trip level where that is the nominal one.
+        // Between two samples a current rises in proportion to the link voltage: by half the trip level at the nominal one.
         let line_share = case.conditions.line_v.map_or(1.0, |line_v| line_v / parameters.dc_link_nominal_v);
         let most_a = trip_a + (CURRENT_SHARE - 1.0) * trip_a * line_share.max(1.0);
         let current_a = match case.fault.cause {
-            // Flux linkage that is there when a device fails cannot leave a machine that is shorted; nothing the gates do is better.
+            // The flux linkage present when a device fails cannot leave a shorted machine; nothing that the gates do is better.
             Cause::Bench(Kind::Device(_)) => most_a.max(FORCED * observed.stored.short_circuit_a),
-            // Nor can that of magnets which by themselves drive more than the trip level through a short circuit.
+            // Nor can the flux linkage of magnets that alone drive more than the trip level through a short circuit.
             _ if self.most_rpm().is_some()
                 && seen.trip.is_some_and(|trip| trip.safe != SafeState::GatesOff) =>
             {
@@ -57,8 +57,8 @@ impl Drive {
         }
     }
 
-    /// The longest time from a fault's first effect until the gates are safe, in s: three carriers, or, where a fault shows with the
-    /// rotor's angle, half an electrical turn.
+    /// The longest time from a fault's first effect until the gates are safe, in s: three carriers, or half an electrical turn if the fault
+    /// shows with the rotor's angle.
     fn longest_s(&self, case: &Case, seen: &Seen) -> f64 {
         let carrier_s = seen.carrier_s;
         let carriers_s = 3.0 * carrier_s;
@@ -73,7 +73,7 @@ impl Drive {
                 let lost_rpm = case.conditions.acceleration_rpm_s.abs() * half_turn_s(speed_rpm, pole_pairs);
                 carriers_s.max(half_turn_s(speed_rpm - lost_rpm, pole_pairs))
             }
-            // Where no current flows only the voltage tells, whose volt-seconds have to add up.
+            // If no current flows, only the voltage tells, and its volt-seconds have to add up.
             Cause::Bench(Kind::Gate(_, false)) if seen.names(Fault::VoltageUnexplained) => STAGES.end_s,
             Cause::Runaway => carriers_s + TRACKING_S,
             Cause::Sensor(..) => {
@@ -85,11 +85,11 @@ impl Drive {
         }
     }
 
-    /// The most torque that safe gates may leave, in N·m: a tenth of the largest, so that nobody is braked who did not ask for it. A
-    /// leg that is stuck has no such choice, and the short circuit's torque has its peak at a few per cent of the speed.
+    /// The most torque that safe gates may leave, in N·m: a tenth of the largest, so that nobody is braked unasked. A stuck leg leaves no
+    /// such choice, and the short circuit's torque peaks at a few per cent of the speed.
     fn safe_torque_limit_nm(&self, case: &Case) -> f64 {
         match case.fault.cause {
-            // A line that goes on falling after the gates are off comes below the EMF in the end.
+            // A line that goes on falling after the gates are off finally drops below the EMF.
             Cause::Bench(Kind::Gate(..) | Kind::Device(_) | Kind::Supply(_)) => f64::INFINITY,
             _ => 0.1 * self.machine.folder.parameters.max_torque_nm,
         }
@@ -102,9 +102,9 @@ impl Drive {
         most_a / capacitance_f * time_s
     }
 
-    /// The highest link voltage that must be expected once the gates are safe, in V: where the line and its choke take the capacitor,
-    /// with the energy on top that is in the machine's field, and that its rotor gives while the field decays; or what the diodes
-    /// rectify. Below its trip level the link may do what it likes.
+    /// The highest link voltage to expect once the gates are safe, in V: that to which the line and its choke charge the capacitor, plus the
+    /// energy in the machine's field and the energy that its rotor gives while the field decays; or that which the diodes rectify. Below
+    /// its trip level the link is not restricted.
     fn forced_udc_v(&self, case: &Case, observed: &Observed) -> f64 {
         let pole_pairs = f64::from(self.machine.folder.parameters.pole_pairs);
         let omega = case.fastest_rpm() * TAU / 60.0 * pole_pairs;
@@ -123,7 +123,7 @@ impl Drive {
 
 /// The speed tracker's lag, in s: 2/500 rad/s.
 const TRACKING_S: f64 = 4e-3;
-/// The largest current between two samples of which neither is above the trip level, over that level.
+/// The largest current between two samples of which neither is above the trip level, as a ratio to that level.
 const BETWEEN_SAMPLES: f64 = 1.1;
-/// From an interrupt's instant to the gates, in s.
+/// Delay from an interrupt's instant to the gates, in s.
 const SAFE_STATE_S: f64 = 25e-6;

@@ -1,4 +1,4 @@
-//! The operating points at which the faults of the PMaSynRM drive come.
+//! The operating points at which the faults of the PMaSynRM drive occur.
 
 use super::conditions::Conditions;
 use super::faults::{Cause, faults};
@@ -9,14 +9,14 @@ use crate::campaign::fault::Named;
 use crate::inject::sensor::AngleFault;
 use crate::inject::traction::Kind;
 
-/// A speed, and how much of the torque envelope is asked for there.
+/// A speed, and the share of the torque envelope that is demanded there.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
     /// In r/min.
     pub speed_rpm: f64,
     /// Share of the envelope, motoring and braking.
     pub share: f64,
-    /// `true` for one of the fast campaign's.
+    /// `true` if the point belongs to the fast campaign.
     pub fast: bool,
 }
 
@@ -24,8 +24,8 @@ const fn point(speed_rpm: f64, share: f64, fast: bool) -> Point {
     Point { speed_rpm, share, fast }
 }
 
-/// The points at which the faults come, of a machine of 6,000 r/min: every mode of the 180 kW machine at several speeds. Patterns of square wave need torque below
-/// 4,455 r/min.
+/// The points at which the faults occur, for a machine of 6,000 r/min: every mode of the 180 kW machine at several speeds. Square-wave
+/// patterns need torque below 4,455 r/min.
 const POINTS: [Point; 18] = [
     point(0.0, 0.8, false),
     point(100.0, 0.8, false),
@@ -47,16 +47,16 @@ const POINTS: [Point; 18] = [
     point(6000.0, 0.8, true),
 ];
 
-/// From where a rotor runs away, in r/min of such a machine: it must be above 6,600 in time.
+/// Speed from which on a rotor runs away, in r/min of such a machine: it must exceed 6,600 in time.
 pub(super) const RUNAWAY_FROM_RPM: f64 = 5_000.0;
 
 impl Named<Cause> {
-    /// `true` if it comes at rest, and the rotor is pushed off.
+    /// `true` if the fault occurs at rest and the rotor is then pushed.
     pub(super) fn needs_rest(&self) -> bool {
         self.name.ends_with("at-rest")
     }
 
-    /// `true` if it can come at a point of a machine of 6,000 r/min.
+    /// `true` if the fault can occur at a point of a machine of 6,000 r/min.
     fn fits(&self, point: &Point) -> bool {
         let speed_rpm = point.speed_rpm.abs();
         match self.cause {
@@ -87,7 +87,7 @@ impl Case {
         format!("pmasynrm {} {} {}", self.fault.name, self.point.speed_rpm, self.action.name())
     }
 
-    /// The fastest that the rotor prescribed for it turns, in r/min.
+    /// The highest speed of the rotor as prescribed for the case, in r/min.
     pub(super) fn fastest_rpm(&self) -> f64 {
         let gained = self.conditions.acceleration_rpm_s * (STAGES.end_s - self.at_s);
         self.point.speed_rpm.abs().max((self.point.speed_rpm + gained).abs())
@@ -95,9 +95,9 @@ impl Case {
 }
 
 impl Drive {
-    /// Every case of its machine; of the fast ones each fault of each kind in each mode.
+    /// Every case of its machine; the fast ones are each fault of each kind in each mode.
     pub fn cases(&self, fast: bool) -> Vec<Case> {
-        // Faster, the EMF is above the link, and the drive shorts the machine before its operator can enable it.
+        // Above this speed the EMF exceeds the link, and the drive shorts the machine before its operator can enable it.
         let operated_to_rpm = self.rectifying_rpm();
         let most_rpm = self.most_rpm().unwrap_or(f64::INFINITY);
         let can_come = |fault: &Named<Cause>, speed_rpm: f64| {
@@ -115,7 +115,7 @@ impl Drive {
                     continue;
                 }
                 let at_s = match fault.cause {
-                    // The machine is another one from the beginning.
+                    // The machine differs from the beginning.
                     Cause::Machine(..) => -LEAD_S,
                     _ => fault_s(list.len()),
                 };

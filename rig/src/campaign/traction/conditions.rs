@@ -1,4 +1,4 @@
-//! Everything about a case but its fault and its operating point: line, true machine, flaws of inverter and sensors, trajectory.
+//! Everything about a case except its fault and its operating point: line, true machine, flaws of inverter and sensors, trajectory.
 
 use crate::bench::Flaws;
 use crate::plant::LineFilter;
@@ -18,7 +18,7 @@ pub struct Conditions {
     pub flaws: Flaws,
     /// Dead time, which the firmware knows and compensates, in ticks.
     pub dead_time_ticks: u32,
-    /// Acceleration of the rotor from the fault's instant on, and until there, in r/min per s.
+    /// Acceleration of the rotor before and after the fault's instant, in r/min per s.
     pub acceleration_rpm_s: f64,
 }
 
@@ -34,9 +34,9 @@ impl Conditions {
         acceleration_rpm_s: 0.0,
     };
 
-    /// Mean torque error that these conditions explain, as a share of the largest torque: what the campaign allows where the machine
-    /// differs by a fifth (a quarter), has twice the resistance (a tenth), or the angle is off by 2° (a tenth), in proportion; and twice
-    /// what a sensor reads too much.
+    /// Mean torque error that these conditions explain, as a share of the largest torque: in proportion to what the campaign allows if the
+    /// machine differs by a fifth (a quarter), has twice the resistance (a tenth), or the angle is off by 2° (a tenth); plus twice a sensor's
+    /// excess reading.
     pub(super) fn torque_share(&self) -> f64 {
         let Flaws { current_gain, udc_gain, angle_error_deg, .. } = self.flaws;
         1.25 * (self.flux_scale - 1.0).abs()

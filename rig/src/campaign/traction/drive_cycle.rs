@@ -1,4 +1,4 @@
-//! Drives that are written down as what happens when, instead of cases.
+//! Drive cycles written as lists of timed events, instead of cases.
 
 use super::{Drive, STAGES};
 use crate::bench::{self, Bench, Flaws, Observed, Simulated};
@@ -13,10 +13,10 @@ use anyhow::Result;
 use tractive::control::Demand;
 use tractive::protection::Trip;
 
-/// A drive written down as what happens when; times in s from the recording's beginning.
+/// A drive cycle written as timed events; times in s from the recording's beginning.
 #[derive(Clone, Debug, Default)]
 pub struct DriveCycle {
-    /// Speeds in r/min, straight lines between.
+    /// Speeds in r/min, linear in between.
     pub speed: Vec<(f64, f64)>,
     /// Torques in N·m, each from its time on, and whether the demand's rate is limited.
     pub torque: Vec<(f64, (f64, bool))>,
@@ -61,7 +61,7 @@ impl Drive {
         let mut tasks = self.tasks(self.devices(0));
         let mut tripped_s = None;
         tasks.drive(&mut bench, |bench| {
-            // Once it has stopped there is little to see.
+            // After the drive has stopped there is little to see.
             if bench.observed.safe.is_some() {
                 tripped_s.get_or_insert(bench.time_s());
             }

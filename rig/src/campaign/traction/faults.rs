@@ -23,11 +23,11 @@ pub enum Cause {
 
 /// The errors of the 180 kW machine's current sensors; their converters' range is a quarter above the trip level.
 const SENSORS: SensorErrors = SensorErrors { offset_a: 60.0, scale: 1.5, noise_a: 30.0, range_a: 379.2 };
-/// The errors of one of them that nobody need feel, in A.
+/// The errors of one of them that need not be noticeable, in A.
 const SMALL_OFFSET_A: f64 = 5.0;
 const SMALL_NOISE_A: f64 = 2.0;
 
-/// Mean torque error where the machine differs by a fifth from its map, as a share of the largest torque.
+/// Mean torque error if the machine differs by a fifth from its map, as a share of the largest torque.
 const ANOTHER_MACHINE: f64 = 0.25;
 
 impl From<Kind> for Cause {
@@ -53,7 +53,7 @@ pub fn faults(scale: &Scale) -> Vec<Named<Cause>> {
     list.0
 }
 
-/// The temperature sensors: of a thermistor and of a PT1000, so that each way of failing looks cold once and hot once.
+/// The temperature sensors, a thermistor and a PT1000, so that each way of failing looks cold once and hot once.
 fn temperatures(list: &mut Faults<Cause>) {
     const WINDING: &[Fault] = &[Fault::WindingSensor];
     const SINK: &[Fault] = &[Fault::HeatSinkSensor];
@@ -71,7 +71,7 @@ fn temperatures(list: &mut Faults<Cause>) {
     }
 }
 
-/// The current sensors, of so many times the 180 kW machine's currents.
+/// The current sensors, for this multiple of the 180 kW machine's currents.
 fn currents(list: &mut Faults<Cause>, scale: f64) {
     let sensors = SENSORS.times(scale);
     for (phase, letter) in ["u", "v", "w"].into_iter().enumerate() {
@@ -105,18 +105,18 @@ fn angles(list: &mut Faults<Cause>) {
     list.add("angle-jump", Kind::Angle(AngleFault::Jump(90.0)), LOST, None, true);
     list.add("angle-glitches", Kind::Angle(AngleFault::Glitches(40.0, 50)), LOST, None, true);
     list.add("angle-reversed", Kind::Angle(AngleFault::Reversed), LOST, None, true);
-    // At rest these cannot be told from a rotor that stands: they come with one that is pushed off.
+    // At rest these cannot be told from a standing rotor, so here the rotor is pushed.
     list.add("angle-frozen-at-rest", Kind::Angle(AngleFault::Frozen), PUSHED, None, true);
     list.add("angle-reversed-at-rest", Kind::Angle(AngleFault::Reversed), PUSHED, None, true);
     list.add("angle-late", Kind::Angle(AngleFault::Late(5)), LOST, Some(BENT), true);
     list.add("angle-off-2deg", Kind::Angle(AngleFault::Jump(2.0)), &[], Some(BENT), true);
 }
 
-/// The line and its link, of so many times the 180 kW machine's voltage.
+/// The line and its link, for this multiple of the 180 kW machine's voltage.
 fn supply(list: &mut Faults<Cause>, scale: f64) {
     const LINK: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage];
     const OVER: &[Fault] = &[Fault::DcOvervoltage, Fault::Overcurrent];
-    // The EMF that the link does not hold any more drives as much current in the same period.
+    // The EMF that the link no longer holds back drives as much current in the same period.
     const UNDER: &[Fault] = &[Fault::DcUndervoltage, Fault::Overcurrent];
     const SWINGS: &[Fault] = &[Fault::DcOvervoltage, Fault::DcUndervoltage, Fault::Overcurrent];
     let swinging = |amplitude_v, hz| Kind::Supply(SupplyFault::Swinging(scale * amplitude_v, hz));
@@ -131,8 +131,8 @@ fn supply(list: &mut Faults<Cause>, scale: f64) {
 fn legs(list: &mut Faults<Cause>) {
     const BLOCKED: &[Fault] = &[Fault::DriverBlocked];
     const STUCK: &[Fault] = &[Fault::LegStuck];
-    // With three pulses a turn a boundary comes every 0.6 ms: the phase's current may reach its trip level before one sees the leg.
-    // Without current its leg shows nothing; its phase takes no part in the voltage.
+    // With three pulses a turn a boundary comes every 0.6 ms: the phase current may reach its trip level before a boundary sees the leg.
+    // Without current the leg shows nothing, and its phase takes no part in the voltage.
     const OPEN: &[Fault] = &[Fault::LegStuck, Fault::Overcurrent, Fault::VoltageUnexplained];
     for (gate, name) in (0_u8..).zip(GATES) {
         let first = gate < 2;

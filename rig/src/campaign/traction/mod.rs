@@ -38,18 +38,18 @@ use tractive::machine::Tables;
 use tractive::modulation::{Ladder, Mode, SwitchLimits};
 use tractive::time::{Clock, Instant};
 
-/// Full torque is reversed in 0.15 s where it cannot step; the aftermath is several electrical turns, and the link's oscillation.
+/// If the torque cannot step, full torque is reversed in 0.15 s; the aftermath covers several electrical turns and the link's oscillation.
 const STAGES: Stages = Stages { torque_s: -0.09, turn_s: 0.1, end_s: 0.3, aftermath_s: 0.06 };
-/// Means of the torque are over this much time, in s.
+/// Time over which the torque is averaged, in s.
 const MEAN_S: f64 = 0.04;
 /// Step of a case's trace, in s.
 const TRACE_STEP_S: f64 = 50e-6;
-/// The acceleration of a rotor that is pushed off, in r/min per s of a machine of 6,000 r/min.
+/// The acceleration of a rotor that is pushed from rest, in r/min per s of a machine of 6,000 r/min.
 const PUSH_RPM_S: f64 = 2_000.0;
 /// The acceleration of a rotor that runs away, likewise: twice what the 180 kW machine itself can do.
 const RUNAWAY_RPM_S: f64 = 12_000.0;
 
-/// The way of a run.
+/// The course of a run.
 struct Way {
     /// The modes that it went through.
     modes: Vec<Mode>,
@@ -62,7 +62,7 @@ pub struct Drive {
     /// The machine that it drives.
     pub machine: Machine,
     scale: Scale,
-    /// The largest current of its short circuit without current before, in A.
+    /// The largest short-circuit current of the machine if no current flowed before, in A.
     short_circuit_a: f64,
     clock: Clock,
     tables: &'static Tables,
@@ -78,7 +78,7 @@ impl Drive {
         Self::of(Machine::load(Traction::MACHINE)?, without)
     }
 
-    /// For any machine, with the rate of control that goes with its devices.
+    /// For any machine, with the control rate that its devices determine.
     ///
     /// # Errors
     /// A machine that the drive would refuse at start-up.
@@ -94,13 +94,13 @@ impl Drive {
         Ok(drive)
     }
 
-    /// The speed up to which a machine may coast whose short circuit begins with a current above the trip level, in r/min: faster, its EMF drives as much through
-    /// the diodes; `None` where it may at every speed.
+    /// The highest speed at which a machine may coast if its short circuit begins with a current above the trip level, in r/min: above it, the EMF
+    /// drives as much current through the diodes. `None` if the machine may coast at every speed.
     pub fn most_rpm(&self) -> Option<f64> {
         (self.short_circuit_a > self.machine.folder.parameters.trip_current_a).then(|| self.rectifying_rpm())
     }
 
-    /// The speed from which on the EMF between the lines is above the nominal link, in r/min.
+    /// The speed above which the line-to-line EMF exceeds the nominal link, in r/min.
     pub(super) fn rectifying_rpm(&self) -> f64 {
         self.machine.folder.parameters.dc_link_nominal_v / emf_v(1.0, &self.machine)
     }
@@ -123,7 +123,7 @@ impl Drive {
         }
     }
 
-    /// Runs one case that is none of a temperature sensor; the way that it went, too.
+    /// Runs one case that is not one of a temperature sensor; returns its course, too.
     fn run_watched(&self, case: &Case) -> Result<(Outcome, Way)> {
         let mut bench = self.bench(case);
         let devices = self.devices(case.conditions.dead_time_ticks);
@@ -232,7 +232,7 @@ impl Drive {
         let settings = bench::Settings {
             injection: Some(Injection { kind, at_s }),
             limits: Limits {
-                // By what the sensors read.
+                // In terms of what the sensors read.
                 current_a: parameters.trip_current_a / (1.0 + conditions.flaws.current_gain),
                 udc_v: (
                     parameters.trip_dc_under_v / (1.0 + conditions.flaws.udc_gain),

@@ -44,20 +44,20 @@ pub const DIMENSIONS: [Dimension; 20] = [
 
 /// The highest speed, in r/min.
 const MOST_RPM: f64 = 6_000.0;
-/// From so many bits on a converter has no steps.
+/// Number of bits from which on a converter has no steps.
 const IDEAL_BITS: f64 = 16.0;
 /// Frequency of the line's ripple, in Hz.
 const RIPPLE_HZ: f64 = 300.0;
-/// Share of the runs in which nothing goes wrong.
+/// Share of the runs without a fault.
 const SOUND_SHARE: f64 = 0.3;
-/// Below this speed a wrong angle cannot be told from a rotor that stands, in r/min.
+/// Speed below which a wrong angle cannot be told from a standing rotor, in r/min.
 const SLOWEST_RPM: f64 = 100.0;
-/// The region of a run that had no pulses when its fault came.
+/// The region of a run that had no pulses when its fault occurred.
 const NO_PULSES: &str = "no pulses";
-/// The coordinate of the action from which there is no torque.
+/// The coordinate of the action from which on there is no torque.
 const COASTING_FROM: f64 = 0.9;
 
-/// The fault of a coordinate. Another machine is no fault here: it is drawn. Temperature sensors have cases of their own.
+/// The fault at a coordinate. A different machine is no fault here, because it is drawn. Temperature sensors have cases of their own.
 fn fault(coordinate: f64) -> Result<Named<Cause>> {
     let mut list = faults(&Scale::ONE);
     list.retain(|fault| !matches!(fault.cause, Cause::Machine(..) | Cause::Sensor(..)));
@@ -67,7 +67,7 @@ fn fault(coordinate: f64) -> Result<Named<Cause>> {
     Ok(list.swap_remove(index))
 }
 
-/// A speed at which the fault can come, in r/min.
+/// A speed at which the fault can occur, in r/min.
 fn speed_rpm(drawn_rpm: f64, fault: &Named<Cause>) -> f64 {
     let between = |slowest_rpm: f64| {
         let share = drawn_rpm.abs() / MOST_RPM;
@@ -82,7 +82,7 @@ fn speed_rpm(drawn_rpm: f64, fault: &Named<Cause>) -> f64 {
     }
 }
 
-/// An acceleration with which the speed keeps within its range, and, where the angle fails, does not come to rest.
+/// An acceleration that keeps the speed within its range and, if the angle fails, does not bring it to rest.
 fn acceleration_rpm_s(drawn: f64, speed_rpm: f64, at_s: f64, fault: &Named<Cause>) -> f64 {
     let drawn = match fault.cause {
         _ if fault.needs_rest() => return 0.0,
@@ -92,7 +92,7 @@ fn acceleration_rpm_s(drawn: f64, speed_rpm: f64, at_s: f64, fault: &Named<Cause
     };
     let (before_s, after_s) = (LEAD_S + at_s, STAGES.end_s - at_s);
     let time_s = if drawn * speed_rpm > 0.0 { after_s } else { before_s };
-    // Where the angle fails, it was never slower than half of what it is then.
+    // If the angle fails, the speed was never below half of its value then.
     let slower_rpm = match fault.cause {
         Cause::Bench(Kind::Angle(_)) => 0.5 * speed_rpm.abs() / before_s,
         _ => f64::INFINITY,
@@ -101,10 +101,10 @@ fn acceleration_rpm_s(drawn: f64, speed_rpm: f64, at_s: f64, fault: &Named<Cause
     drawn.clamp(-most, most)
 }
 
-/// The values within their ranges, or sound.
+/// Checks that each value is within its range, or sound.
 ///
 /// # Errors
-/// The first that is neither.
+/// The first value that is neither.
 fn check(values: &[f64]) -> Result<()> {
     for (Dimension { name, low, high, sound }, value) in DIMENSIONS.iter().zip(values) {
         if !(*low..=*high).contains(value) && *sound != Some(*value) {
@@ -115,7 +115,7 @@ fn check(values: &[f64]) -> Result<()> {
 }
 
 impl Drive {
-    /// The case of some values, in the order of [`DIMENSIONS`]; `seed` is the noise's.
+    /// The case with these values, in the order of [`DIMENSIONS`]; `seed` is the noise's.
     pub fn case(&self, values: &[f64], seed: u64) -> Result<Case> {
         let &[
             fault_at,
@@ -179,7 +179,7 @@ impl Drive {
         Ok(Case { fault, point, action, at_s, conditions })
     }
 
-    /// Runs the case of some values.
+    /// Runs the case with these values.
     pub fn run_values(&self, run: usize, values: &[f64], seed: u64) -> Result<Run> {
         let case = self.case(values, seed)?;
         let (outcome, Way { modes, region }) = self.run_watched(&case)?;

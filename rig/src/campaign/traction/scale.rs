@@ -1,9 +1,9 @@
-//! The sizes of the cases, which were written for the 180 kW machine, on another one.
+//! The sizes of the cases, which were written for the 180 kW machine, scaled to another one.
 
 use crate::machine::Machine;
 use crate::plant::LineFilter;
 
-/// Sizes of a machine over those of the 180 kW machine.
+/// Ratios of a machine's sizes to those of the 180 kW machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     /// Of the largest speed.
@@ -12,7 +12,7 @@ pub struct Scale {
     pub current: f64,
     /// Of the link's nominal voltage.
     pub voltage: f64,
-    /// Of that voltage squared over the largest power: what chokes and resistors of a line follow, and capacitors inversely.
+    /// Of that voltage squared over the largest power: a line's chokes and resistors scale with it, and capacitors inversely.
     pub impedance: f64,
 }
 

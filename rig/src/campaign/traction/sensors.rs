@@ -1,4 +1,4 @@
-//! Cases of the temperature sensors: the operator reads them, so these alone run with one.
+//! Cases of the temperature sensors: the operator reads these sensors, so only these cases run with an operator.
 
 use super::cases::Case;
 use super::{Drive, TRACE_STEP_S, last_torque_nm};
@@ -18,20 +18,20 @@ use tractive::modulation::Mode;
 use tractive::operator::{Line, Request};
 use tractive::protection::{SafeState, Trip};
 
-/// Before the recording, in s: the operator tests himself, charges, enables, and gives torque.
+/// Time before the recording, in s: the operator tests itself, charges, enables, and gives torque.
 const LEAD_S: f64 = 0.6;
 const CHARGE_S: f64 = -0.5;
 const ENABLE_S: f64 = -0.3;
 const TORQUE_S: f64 = -0.2;
 /// Length of the recording, in s.
 const END_S: f64 = 0.06;
-/// Time for which a sensor must be wrong, in s, as the guide has it.
+/// Time for which a sensor must read wrong, in s, as the guide states.
 const PERSISTENCE_S: f64 = 0.01;
-/// Slots of the operator from a reading to gates that are off, in s: one begun already, its own, and the one in which its word holds.
+/// Operator slots from a reading until the gates are off, in s: the one already begun, its own, and the one in which its order holds.
 const SLOTS_S: f64 = 3e-3;
 
-/// The longest time from a sensor's fault until the gates are off, in s; the pulses that are planned end first. Where a machine goes on generating
-/// they are shorted an electrical turn later.
+/// The longest time from a sensor's fault until the gates are off, in s; the planned pulses end first. If the machine goes on generating,
+/// it is shorted an electrical turn later.
 pub(super) fn longest_s(carrier_s: f64, safe: Option<SafeState>, turn_s: f64) -> f64 {
     let off_s = PERSISTENCE_S + SLOTS_S + carrier_s;
     if safe == Some(SafeState::ShortCircuit) { off_s + turn_s } else { off_s }
@@ -121,8 +121,8 @@ const PRECHARGE_OHM: f64 = 50.0;
 const DISCHARGE_OHM: f64 = 100.0;
 const CHOPPER_OHM: f64 = 12.0;
 
-/// The operator's fault with the safe state that the drive found itself, if any, and what was observed from the last edge on: where nobody orders a
-/// safe state, the pulses end.
+/// The operator's fault with the safe state that the drive found itself, if any, and the observations from the last edge on: if nobody orders
+/// a safe state, the pulses end.
 fn told(recording: &Recording, before: Observed, safe: SafeState) -> (Option<Trip>, Observed) {
     let trip = recording.slots.iter().find_map(|slot| slot.status.trip).map(|trip| Trip { safe, ..trip });
     let last = recording.edges.iter().rfind(|edge| !edge.on).map(|edge| edge.tick);
