@@ -1,8 +1,8 @@
-//! The bound that the nine-switch modulator's own pulses set: the phase currents of both motors in steady state, with no control at all.
+//! The bound set by the nine-switch modulator's own pulses: the phase currents of both motors in steady state, without any control.
 //!
-//! The pulses' volt-seconds, less those of the fundamental, are the ripple of the flux linkage. Put around the mean flux linkage of the
-//! operating point and turned into current by the inductances there, they give the least that any control could reach with these pulses. Both motors
-//! turn at their own speeds, so nothing repeats, and the answer is a stretch of time.
+//! The pulses' volt-seconds, less those of the fundamental, are the ripple of the flux linkage. Added to the mean flux linkage of the
+//! operating point and converted into current by the inductances there, they give the least that any control could reach with these pulses. The
+//! motors turn at their own speeds, so nothing repeats, and the result is a stretch of time.
 
 use super::trace::{MotorRow, Row};
 use crate::machine::Machine;
@@ -14,19 +14,19 @@ use tractive_tablegen::SmoothMap;
 /// Instants in a row's step at which the current is taken; a row holds their mean.
 const WITHIN_ROW: usize = 4;
 
-/// The stretch of time that is asked for.
+/// The stretch of time that is requested.
 #[derive(Clone, Copy, Debug)]
 pub struct Stretch {
     /// Carrier frequency, in Hz.
     pub carrier_hz: f64,
     /// Step of the rows, in s.
     pub step_s: f64,
-    /// Number of rows, of which the last one is that of the operating point.
+    /// Number of rows, the last of which is that of the operating point.
     pub count: usize,
 }
 
-/// Current of phase u of either motor in A, row by row, at the operating point that some rows in steady state hold; `None` where a motor
-/// stands still, or does not get the voltage that it needs.
+/// Current of phase u of either motor in A, row by row, at the operating point that some rows in steady state hold; `None` if a motor
+/// stands still or does not get the voltage that it needs.
 pub fn currents(rows: &[Row], stretch: Stretch, machine: &Machine) -> Option<[Vec<f64>; 2]> {
     let (last, count) = (rows.last()?, rows.len() as f64);
     let link_v = rows.iter().map(|row| row.link_v).sum::<f64>() / count;
@@ -69,7 +69,7 @@ pub fn currents(rows: &[Row], stretch: Stretch, machine: &Machine) -> Option<[Ve
     Some([motors[0].phase_u(&upper, instant), motors[1].phase_u(&lower, instant)])
 }
 
-/// The pulses, with the volt-seconds that the motors have had of them.
+/// The pulses, with the volt-seconds that they have applied to the motors so far.
 struct Pulses<'a> {
     carrier_hz: f64,
     link_v: f64,
@@ -88,7 +88,7 @@ impl Pulses<'_> {
         (period as f64 + share) / self.carrier_hz
     }
 
-    /// The gates of a period with these voltages; `None` where they do not fit.
+    /// The gates of a period with these voltages; `None` if they do not fit.
     fn gates(&self, angles: [f64; 2], voltages_v: [f64; 2]) -> Option<Period> {
         let [upper, lower] = [0, 1].map(|k| MotorVoltage {
             angle: Angle::from_turns((angles[k] / TAU).rem_euclid(1.0) as f32),
@@ -98,7 +98,7 @@ impl Pulses<'_> {
         step(&request).ok().filter(|period| period.applied.feasible())
     }
 
-    /// Stretches of a period, each by its end as a share of it, with the levels until then.
+    /// Stretches of a period, each given by its end as a share of the period, with the levels until then.
     fn edges(&self, period: &Period) -> Vec<(f64, Levels)> {
         let toggles = period.gates.iter().flat_map(GatePattern::toggles).map(f64::from);
         let mut ends: Vec<f64> = toggles.chain([1.0]).collect();
@@ -123,8 +123,8 @@ impl Pulses<'_> {
     }
 }
 
-/// The nodes at an instant of a period: the upper motor's are high where H is on, the lower one's low where L is; where a leg shorts the link,
-/// there is no voltage.
+/// The nodes at an instant of a period: the upper motor's are high while H is on, the lower one's are low while L is; while a leg shorts the
+/// link, there is no voltage.
 fn levels(gates: &[GatePattern; 9], at: f64) -> Levels {
     let on = gates.map(|gate| {
         // A pause that meets its mirror image covers the middle, too.
@@ -144,14 +144,14 @@ struct Motor {
     rotor: (f64, f64, f64),
     /// Mean currents (d, q), in A.
     current_a: (f64, f64),
-    /// Currents of a flux linkage more, in A/Wb: d of d, d of q, q of d, q of q.
+    /// Change of current per change of flux linkage, in A/Wb: d of d, d of q, q of d, q of q.
     softness: [f64; 4],
-    /// The voltage that they need, in V, and its angle before the rotor's, in rad.
+    /// The voltage that these currents need, in V, and its angle ahead of the rotor's, in rad.
     voltage_v: f64,
     ahead: f64,
 }
 
-/// The least electrical speed, in rad/s: slower motors hardly turn in the time that is looked at.
+/// The least electrical speed, in rad/s: slower motors hardly turn in the time considered.
 const LEAST_RAD_S: f64 = 12.0;
 
 impl Motor {
@@ -194,7 +194,7 @@ impl Motor {
     fn ripple(&self, (alpha, beta): (f64, f64), t_s: f64) -> (f64, f64) {
         let (sin, cos) = self.voltage_angle(t_s).sin_cos();
         let length = self.voltage_v / self.rotor.2;
-        // The integral of a turning vector is a quarter of a turn behind it.
+        // The integral of a rotating vector lags it by a quarter of a turn.
         (alpha - length * sin, beta + length * cos)
     }
 

@@ -11,14 +11,14 @@ use tractive::recorder::DualRecord;
 /// A curve: its name and what it shows.
 pub type Curve<'a> = report::Curve<'a, Row>;
 
-/// The paper's figure that a plot answers, its title, its unit. Of figures 14 to 36 the captions that are known are those of 17, 23 and 36; the
-/// others are told only as the group that the text speaks of.
+/// The paper's figure that a plot answers, its title, its unit. Of figures 14 to 36 only the captions of 17, 23 and 36 are known; the others
+/// are named only by the group that the text mentions.
 pub type Heading<'a> = (&'a str, &'a str, &'a str);
 
 /// The motors' torques.
 pub const TORQUES: [Curve; 2] =
     [("motor 1", |row| row.motors[0].torque_nm), ("motor 2", |row| row.motors[1].torque_nm)];
-/// The torques that control wants of the motors.
+/// The torques that control demands of the motors.
 pub const DEMANDS: [Curve; 2] =
     [("demand 1", |row| row.motors[0].torque_ref_nm), ("demand 2", |row| row.motors[1].torque_ref_nm)];
 /// The motors' speeds.
@@ -40,7 +40,7 @@ pub fn common(recording: &Recording) -> Figures {
     Figures::of_run(simulated_s, recording.trip(), largest(rows, peak))
 }
 
-/// The link's range in some rows, in which `wanted_v` (V) is wanted.
+/// The range of the link voltage in some rows, in which `wanted_v` (V) is demanded.
 pub fn link(figures: &mut Figures, rows: &[Row], wanted_v: f64) {
     let high = largest(rows, |row| row.link_v - wanted_v);
     let low = -largest(rows, |row| wanted_v - row.link_v);
@@ -85,13 +85,13 @@ pub fn thd_percent(recording: &Recording, cycles: f64, value: impl Fn(&Row) -> f
     (squares / count / fundamental - 1.0).max(0.0).sqrt() * 100.0
 }
 
-/// Curves over time, under what they answer, with their title and unit.
+/// Curves over time, under the figure that they answer, with their title and unit.
 pub fn plot(page: &mut Page, (figure, title, unit): Heading, rows: &[Row], curves: &[Curve]) {
     page.answers(figure);
     page.plot_rows(title, unit, rows, curves);
 }
 
-/// Both motors' phase currents, under the figure that the page's plots answer so far.
+/// Both motors' phase currents, under the figure that the page's plots currently answer.
 pub fn phases(page: &mut Page, rows: &[Row]) {
     page.plot_rows("phase currents of motor 1", "A", rows, &phase_curves::<0>());
     page.plot_rows("phase currents of motor 2", "A", rows, &phase_curves::<1>());

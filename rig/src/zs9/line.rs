@@ -1,7 +1,7 @@
 //! The ZS9's line side: contactors, precharge and discharge resistors between the source and the Z-network.
 //!
-//! While the main contactor is open the gates are off, and what charges or discharges the capacitors is slow against the network's own
-//! oscillation: both follow as one, and the inductors are without current.
+//! While the main contactor is open the gates are off, and charging or discharging the capacitors is slow compared with the network's own
+//! oscillation: both capacitors follow together, and the inductors carry no current.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 use crate::bench::{Switchgear, Tick};
@@ -20,12 +20,12 @@ pub struct LineSide {
     /// Contactors and slots.
     pub gear: Switchgear<(), [tractive::ports::MotorDemand; 2]>,
     discharge: bool,
-    /// The operator's last word that has taken effect.
+    /// The operator's last status that has taken effect.
     pub status: Option<DualStatus>,
 }
 
 impl LineSide {
-    /// The voltage that is left in capacitors that are empty, in V: the plant is made for a network that is charged.
+    /// The voltage left in empty capacitors, in V: the plant is made for a charged network.
     pub const EMPTY_V: f64 = 1.0;
 
     /// At tick 0, everything open.
@@ -52,7 +52,7 @@ impl LineSide {
     }
 }
 
-/// The switches that connect source, network and discharge resistor; each is on where it is true.
+/// The switches that connect source, network and discharge resistor; each is on if its field is true.
 #[derive(Clone, Copy, Debug)]
 pub struct Feeding {
     /// The main contactor.
@@ -79,7 +79,7 @@ impl Feeding {
         }
         let capacitor_v = capacitor_v.max(LineSide::EMPTY_V);
         plant.network = NetworkState::even(0.0, capacitor_v);
-        // Nothing flows between a source and capacitors of one voltage.
+        // No current flows between a source and capacitors of equal voltage.
         plant.source_v = capacitor_v;
     }
 }

@@ -16,7 +16,7 @@ pub struct Orders {
 /// The motors' true speeds, in r/min.
 pub type SeenMotors = [f64; 2];
 
-/// Says every control period what is wanted.
+/// Gives the demands in every control period.
 pub trait Operator {
     /// Orders at `t_s` seconds after the recording begins (negative before).
     fn orders(&mut self, t_s: f64, speeds_rpm: SeenMotors) -> Orders;

@@ -1,4 +1,4 @@
-//! The firmware's settings for a run: what the host's tasks and the image are told alike.
+//! The firmware's settings for a run, the same for the host's tasks and the image.
 
 use crate::machine::Machine;
 use crate::run::refused;
@@ -12,7 +12,7 @@ pub fn carrier_ticks(clock: &Clock, carrier_hz: u32) -> u32 {
     (clock.ticks_per_s / carrier_hz as f32).round() as u32
 }
 
-/// The drive's settings for two machines of a kind; without a dead time.
+/// The drive's settings for two machines of one kind, without a dead time.
 pub fn drive(clock: Clock, carrier_hz: u32, tables: &Tables) -> Settings {
     Settings::new(clock, carrier_ticks(&clock, carrier_hz), tables)
 }
@@ -26,7 +26,7 @@ pub fn with_dead_time(settings: Settings, dead_time_s: f64) -> Settings {
 /// The check that a drive may start with these settings and this machine.
 ///
 /// # Errors
-/// Names the machine's key, and what control would need.
+/// Names the machine's key, and what control would need instead.
 pub fn check(settings: &Settings, machine: &Machine) -> Result<()> {
     let parameters = &machine.folder.parameters;
     let Err(found) = settings.check(machine.tables) else { return Ok(()) };

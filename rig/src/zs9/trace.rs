@@ -1,4 +1,4 @@
-//! The files that a run of the ZS9 leaves behind. Files are written whole or not at all.
+//! The files that a run of the ZS9 leaves behind. They are written whole or not at all.
 
 use crate::columns;
 use crate::files::{Cell, Columns, bytes_of_rows, write_edges, write_recorder, write_rows};
@@ -10,7 +10,7 @@ use tractive::nine_switch::Scheme;
 use tractive::protection::Trip;
 use tractive::recorder::DualRecord;
 
-/// Names of the gates in edges.csv, in the order of the modulator's.
+/// Names of the gates in edges.csv, in the modulator's order.
 const GATES: [&str; 9] = ["uh", "vh", "wh", "um", "vm", "wm", "ul", "vl", "wl"];
 
 /// A gate edge.
@@ -29,7 +29,7 @@ pub struct Edge {
 pub struct MotorRow {
     /// Mechanical speed, in r/min.
     pub speed_rpm: f64,
-    /// Torque that control wants, in N·m.
+    /// Torque that control demands, in N·m.
     pub torque_ref_nm: f64,
     /// Air-gap torque, in N·m.
     pub torque_nm: f64,
@@ -43,7 +43,7 @@ pub struct MotorRow {
     pub load_nm: f64,
     /// Commanded peak phase voltage, in V, at the step's end.
     pub voltage_v: f64,
-    /// `true` if the voltage limit holds the operating point.
+    /// `true` if the voltage limit determines the operating point.
     pub weakening: bool,
 }
 
@@ -72,7 +72,7 @@ pub struct Row {
     pub source_j: f64,
     /// Speeds at the step's end, in r/min.
     pub kinetic_speed_rpm: [f64; 2],
-    /// Energy in losses, at the shafts and stored at the step's end, in J: what [`Row::source_j`] should be but for a constant.
+    /// Energy in losses, at the shafts and stored at the step's end, in J: equal to [`Row::source_j`] except for a constant.
     pub explained_j: f64,
 }
 
@@ -80,7 +80,7 @@ pub struct Row {
 pub struct Recording {
     /// Rows of the trace, at the step at which they are judged.
     pub rows: Vec<Row>,
-    /// Rows of trace.csv, where it has another step.
+    /// Rows of trace.csv, if it has another step.
     pub written: Option<Vec<Row>>,
     /// `true` if edges were kept.
     pub keeps_edges: bool,

@@ -1,4 +1,4 @@
-//! The carrier's periods as the gates' toggles.
+//! The carrier's periods as toggles of the gates.
 
 use super::{Bench, BenchError};
 use crate::bench::Tick;
@@ -6,7 +6,7 @@ use crate::inject::zs9::Kind;
 use crate::zs9::settings::with_dead_time;
 
 impl Bench {
-    /// The next period takes over at a valley.
+    /// Begins the next period at a valley.
     pub(super) fn begin_period(&mut self) -> Result<(), BenchError> {
         let nothing = BenchError::NothingToPlay { what: "carrier period", at_s: self.time.now_s() };
         let period = self.next.take().ok_or(nothing)?;
@@ -17,7 +17,7 @@ impl Bench {
         if let Some(Kind::Gate(gate, false)) = self.spoiler.injected.kind(self.time.now_s()) {
             let pause = &period.gates[usize::from(gate)];
             let drive = with_dead_time(self.settings.drive, self.settings.dead_time_s);
-            // Dead times may swallow a shorter pulse.
+            // Dead times may swallow a pulse that is shorter.
             if pause.off_to - pause.off_from < drive.longest_pause_steps() {
                 self.observed.makes_a_difference(self.time.now);
             }
@@ -39,11 +39,11 @@ impl Bench {
         Ok(())
     }
 
-    /// The gates as they are: what is stuck does not do what it is told.
+    /// The actual states of the gates: a stuck gate does not follow its order.
     pub(super) fn real_levels(&self) -> [bool; 9] {
         let mut levels = self.gates.levels;
         match self.spoiler.injected.kind(self.time.now_s()) {
-            // What turns the gates off for good holds the drivers, whatever they are ordered.
+            // Once the gates are turned off for good, the drivers are held off, whatever the orders.
             Some(Kind::Gate(gate, on)) if !self.off => levels[usize::from(gate)] = on,
             Some(Kind::ShootThrough(leg)) if !self.off => {
                 for gate in [leg, leg + 3, leg + 6] {

@@ -1,20 +1,20 @@
-//! The nine gates: what they are ordered to be, and what they are once dead times have passed.
+//! The nine gates: their ordered states, and their actual states once dead times have passed.
 
 use crate::bench::Tick;
 use crate::plant::zs9::LegGates;
 
 /// Orders and levels, in the order of [`tractive::nine_switch::GATES`].
 pub struct Gates {
-    /// The states that are ordered.
+    /// The ordered states.
     pub ordered: [bool; 9],
-    /// The states.
+    /// The actual states.
     pub levels: [bool; 9],
-    /// The times at which those that wait for the dead time turn on.
+    /// The times at which the gates that wait for the dead time turn on.
     turn_on: [Option<Tick>; 9],
     dead_time: Tick,
-    /// From when on edges are kept, if they are.
+    /// The time from which edges are kept, if they are.
     edges_from: Option<Tick>,
-    /// Edges that were kept: when, which gate, on or off.
+    /// Edges that were kept: time, gate, on or off.
     pub edges: Vec<(Tick, u8, bool)>,
 }
 
@@ -41,7 +41,7 @@ impl Gates {
         self.turn_on.iter().flatten().min().copied()
     }
 
-    /// Turns on those that have waited long enough.
+    /// Turns on the gates that have waited long enough.
     pub fn act(&mut self, now: Tick) {
         for gate in 0..9 {
             if self.turn_on[usize::from(gate)].is_some_and(|at| at <= now) {
@@ -51,8 +51,8 @@ impl Gates {
         }
     }
 
-    /// New orders to the gates. One that turns on where another one of its leg turns off waits for the dead time; one that
-    /// turns on alone shorts its leg on purpose, at once.
+    /// New orders to the gates. A gate that turns on while another gate of its leg turns off waits for the dead time; a gate that
+    /// turns on alone shorts its leg on purpose, so it turns on at once.
     pub fn order(&mut self, now: Tick, ordered: [bool; 9]) {
         if ordered == self.ordered {
             return;
@@ -71,7 +71,7 @@ impl Gates {
             for (gate, _) in gates.into_iter().zip(turns_off).filter(|(_, turns)| *turns) {
                 self.turn_on[usize::from(gate)] = None;
                 self.set(now, gate, false);
-                // Whoever waits already waits for this one too.
+                // A gate that already waits now waits for this one, too.
                 for other in gates.map(usize::from) {
                     self.turn_on[other] = self.turn_on[other].map(|_| now + self.dead_time);
                 }
@@ -87,7 +87,7 @@ impl Gates {
         self.ordered = ordered;
     }
 
-    /// As [`as_diodes_have_it`]; without a dead time no gate is waited for.
+    /// As [`as_diodes_have_it`]; without a dead time no gate waits.
     pub fn as_diodes_have_it(
         &self,
         gates: [LegGates; 3],
@@ -107,8 +107,8 @@ impl Gates {
     }
 }
 
-/// The legs of a bridge that pulses, with the states that the diodes give those which wait for a gate: the current of a node that is not tied to a rail
-/// chooses it. Out of the node it flows through a diode from below, into it through one from above.
+/// The legs of a pulsing bridge, with the states that the diodes give to legs that wait for a gate: at a node that is not tied to a rail the current
+/// chooses the state. Current out of the node flows through a diode from below, current into it through one from above.
 pub fn as_diodes_have_it(gates: [LegGates; 3], currents_a: impl FnOnce() -> [[f64; 3]; 2]) -> [LegGates; 3] {
     let [upper, lower] = currents_a();
     core::array::from_fn(|leg| {
@@ -117,7 +117,7 @@ pub fn as_diodes_have_it(gates: [LegGates; 3], currents_a: impl FnOnce() -> [[f6
             (false, false, true) => choose(upper[leg], LegGates::ZERO, LegGates::ONE),
             (true, false, false) => choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE),
             (false, true, false) => choose(upper[leg] + lower[leg], LegGates::ZERO, LegGates::MINUS_ONE),
-            // Two exchanges within a dead time: both nodes are free; where their currents pull them together, the sum chooses.
+            // Two exchanges within a dead time: both nodes are free; if their currents pull them together, the sum chooses.
             (false, false, false) if upper[leg] <= 0.0 => {
                 choose(lower[leg], LegGates::ONE, LegGates::MINUS_ONE)
             }

@@ -1,4 +1,4 @@
-//! The changes that somebody makes on the ZS9's bench while it runs, and the rows that he takes from it.
+//! The changes made on the ZS9's bench while it runs, and the rows taken from it.
 
 use super::Bench;
 use crate::bench::{Limits, Observed, Tick};
@@ -24,7 +24,7 @@ impl Bench {
         (self.rows.take(), edges.into_iter().map(seconds).collect())
     }
 
-    /// The operator's last word; `None` in the first slot.
+    /// The operator's last status; `None` in the first slot.
     pub fn status(&self) -> Option<DualStatus> {
         self.line.as_ref().and_then(|line| line.status)
     }
@@ -45,7 +45,7 @@ impl Bench {
         self.nominal_source_v = source_v;
     }
 
-    /// Link voltage wanted, in V, and the place of the zero vectors.
+    /// Demanded link voltage, in V, and the place of the zero vectors.
     pub fn set_link(&mut self, link_ref_v: f64, scheme: Scheme) {
         self.settings.link_ref_v = link_ref_v;
         self.settings.scheme = scheme;
@@ -56,7 +56,7 @@ impl Bench {
         self.plant.set_flux_scale(flux_scale);
     }
 
-    /// Something goes wrong from the next instant on. A fault before this one is mended.
+    /// Injects a fault from the next instant on. An earlier fault is mended first.
     pub fn inject(&mut self, kind: Kind) {
         self.mend();
         let from = self.time.now + 1;
@@ -64,7 +64,7 @@ impl Bench {
         self.observed = Observed::new(from, Limits::NONE);
     }
 
-    /// Mends what was injected; what the drive has latched stays latched.
+    /// Mends the injected fault; what the drive has latched stays latched.
     pub fn mend(&mut self) {
         self.spoiler = Spoiler::new(None);
         self.observed = Observed::new(Tick::MAX, Limits::NONE);

@@ -1,7 +1,7 @@
 //! The ZS9's bench: plant, gates and sensors in the timers' time, sampled and recorded.
 //!
 //! Time is counted in compare steps of the firmware's timers, so both sides agree on every edge. As on the first
-//! system's bench nothing runs ahead of what is decided, and what an interrupt orders takes effect at a fixed delay after
+//! system's bench, nothing runs ahead of what has been decided, and an interrupt's order takes effect at a fixed delay after
 //! its nominal instant.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
@@ -33,7 +33,7 @@ use tractive::operator::{DualStatus, Feedback};
 use tractive::ports::{DualDriveCommand, DualReport, DualSample, GateFeedback, PlayedPeriod};
 use tractive::time::Instant;
 
-/// The delay from the control interrupt's nominal instant until its order to turn the gates off reaches them, in ticks (75 µs): its
+/// The delay from the control interrupt's nominal instant until its order to turn the gates off reaches the gates, in ticks (75 µs): its
 /// latest deadline.
 const CONTROL_OFF_TICKS: u32 = 1875;
 /// The same for the PWM interrupt (25 µs), as a bound on its length.
@@ -49,11 +49,11 @@ pub struct Bench {
     nominal_source_v: f64,
     time: Timeline,
     course: Course,
-    /// Beginning of the carrier period that is played, and its length.
+    /// Beginning of the carrier period being played, and its length.
     begun: Tick,
     period: Tick,
     next: Option<PlayedPeriod>,
-    /// Toggles of the running period that are still to come, the last one first.
+    /// Toggles still to come in the running period, the last one first.
     toggles: Vec<(Tick, u8)>,
     gates: Gates,
     off: bool,
@@ -67,7 +67,7 @@ pub struct Bench {
     feedback: GateFeedback,
     orders: Orders,
     control: Conversions<(DualSample, DualDriveCommand), DualReport>,
-    /// The rows that are judged, and the others that are written.
+    /// The rows that are judged, and those that are written besides.
     rows: Spans,
     written: Option<Spans>,
 }
@@ -115,7 +115,7 @@ impl Bench {
         self
     }
 
-    /// The same beginning at another tick than 0, with tasks of [`super::run::Tasks::beginning_at`] the same: where instants wrap.
+    /// The same beginning at another tick than 0, like tasks of [`super::run::Tasks::beginning_at`], for runs in which instants wrap.
     pub fn beginning_at(mut self, origin_ticks: u64) -> Self {
         let origin = origin_ticks * Tick::from(COMPARE_STEPS);
         self.time = self.time.beginning_at(origin);
@@ -129,7 +129,7 @@ impl Bench {
         self
     }
 
-    /// The same with a trace that is written at a step of its own, in s, beside the one that is judged.
+    /// The same with a trace that is written at its own step, in s, beside the one that is judged.
     pub fn writing_every(mut self, step_s: f64) -> Self {
         self.written = Some(Spans::new(step_s, self.settings.duration_s, &self.time));
         self
@@ -197,7 +197,7 @@ impl Bench {
     /// The PWM interrupt at `instant` lets the gates be played again.
     pub fn leave(&mut self, instant: Instant) {
         let at = self.time.widen(instant) + self.time.of_ticks(PWM_OFF_TICKS);
-        // An order to turn them off that comes meanwhile stands.
+        // An order to turn them off that comes meanwhile takes precedence.
         if self.off_at.is_none() {
             self.off_at = Some((at, false));
         }

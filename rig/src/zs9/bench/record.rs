@@ -59,7 +59,7 @@ impl Bench {
         self.rows.next().min(written)
     }
 
-    /// Ends the rows that end now, if they have begun.
+    /// Ends the rows that are due now, if they have begun.
     pub(super) fn record(&mut self) {
         let sums = self.plant.take_sums();
         let seen = Seen {

@@ -1,4 +1,4 @@
-//! Lets time pass, and does what is due on the way.
+//! The passing of time, with everything that is due on the way.
 
 use super::{Bench, BenchError};
 use crate::bench::Tick;
@@ -13,7 +13,7 @@ const INPUT_F: f64 = 500e-6;
 const LONGEST_LOST_S: f64 = 10e-6;
 
 impl Bench {
-    /// Runs to `to`, doing on the way all that is due, and at `to` itself too.
+    /// Runs to `to`, doing all that is due on the way and at `to` itself.
     pub(super) fn advance(&mut self, to: Tick) -> Result<(), BenchError> {
         if self.time.now == self.time.origin && self.next.is_some() {
             self.begin_period()?;
@@ -49,7 +49,7 @@ impl Bench {
         self.integrate_fed(to)
     }
 
-    /// With the source cut off: what its capacitor gives it loses.
+    /// With the source cut off, its capacitor loses the energy that it gives.
     fn integrate_lost(&mut self, to: Tick) -> Result<(), BenchError> {
         let before_j = self.plant.energies.source_j;
         self.integrate_fed(to)?;
@@ -135,7 +135,7 @@ impl Bench {
         Ok(())
     }
 
-    /// The source's voltage at its contactor, as the fault has it, in V.
+    /// The source's voltage at its contactor, with the fault's effect, in V.
     pub(super) fn behind_contactor_v(&self) -> f64 {
         let t_s = self.time.now_s();
         match self.spoiler.injected.kind(t_s) {

@@ -9,7 +9,7 @@ use tractive::ports::{DualDriveCommand, DualReport, DualSample, HardwareBreak, P
 use tractive::thermal::Ratios;
 use tractive::time::Instant;
 
-/// The error of a current's reading that makes no difference which counts, in A: a tenth of a machine's largest current.
+/// The error of a current's reading up to which it counts as making no difference, in A: a tenth of a machine's largest current.
 const MUCH_A: f32 = 8.49;
 
 impl Bench {
@@ -25,7 +25,7 @@ impl Bench {
         self.control.tell(&self.time, instant, report);
     }
 
-    /// By how much the control interrupt is late, in ticks.
+    /// Lateness of the control interrupt, in ticks.
     pub fn control_late_ticks(&self) -> u32 {
         self.spoiler.injected.late_ticks(self.time.now_s())
     }
@@ -54,7 +54,7 @@ impl Bench {
         self.plant.motors.each_ref().map(|motor| self.converter.currents(motor))
     }
 
-    /// Notes readings that are off by more than a little.
+    /// Notes readings that are off by more than this error.
     fn compare(&mut self, true_a: [Abc; 2], read_a: [Abc; 2]) {
         let off = |(read, told): (Abc, Abc)| {
             (read.a - told.a).abs().max((read.b - told.b).abs()).max((read.c - told.c).abs())
@@ -76,7 +76,7 @@ impl Bench {
         self.set_loads_nm(self.orders.loads_nm);
         let healthy_v = held(&self.course.source_v, t_s).unwrap_or(self.nominal_source_v);
         let supply_v = healthy_v + self.converter.ripple_v(t_s);
-        // What is cut off is its capacitor's.
+        // If the source is cut off, its voltage is its capacitor's.
         let source_v = if self.spoiler.injected.kind(t_s) == Some(Kind::SourceLost) {
             self.plant.source_v
         } else {
@@ -86,7 +86,7 @@ impl Bench {
         match &mut self.line {
             None => self.plant.source_v = source_v,
             Some(line) => {
-                // Without the control interrupt nobody looks at slots.
+                // Without the control interrupt nobody handles slots.
                 let held = Held { hardware, position_known: true, temperatures: Ratios::default() };
                 if has_control && line.gear.sampled(self.time.tick(), held, || ()) {
                     return Err(BenchError::OperatorLate(t_s));

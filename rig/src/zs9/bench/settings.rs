@@ -17,7 +17,7 @@ pub struct BenchSettings {
     pub duration_s: f64,
     /// Step of the trace, in s.
     pub trace_step_s: f64,
-    /// Link voltage wanted, in V.
+    /// Demanded link voltage, in V.
     pub link_ref_v: f64,
     /// The place of the zero vectors.
     pub scheme: Scheme,
@@ -25,15 +25,15 @@ pub struct BenchSettings {
     pub flaws: Flaws,
     /// The fault that is injected.
     pub injection: Option<Injection<Kind>>,
-    /// Beyond what it is said to make a difference.
+    /// Limits beyond which a fault counts as making a difference.
     pub limits: Limits,
     /// `true` if edges are kept.
     pub edges: bool,
-    /// Time for which a gate that turns on where another one of its leg turns off has to wait, in s.
+    /// Time for which a gate has to wait that turns on while another gate of its leg turns off, in s.
     pub dead_time_s: f64,
 }
 
-/// The changes that come by themselves while it drives: times in s from the recording's beginning, each value from its time on.
+/// The changes that occur by themselves during the run: times in s from the recording's beginning, each value from its time on.
 #[derive(Clone, Debug, Default)]
 pub struct Course {
     /// Voltages of the source, in V; the plant's own before the first.

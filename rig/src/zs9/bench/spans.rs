@@ -1,4 +1,4 @@
-//! The rows of the trace at one step, and the sums over the one that has begun.
+//! The rows of the trace at one step, and the sums over the current row.
 
 use crate::bench::{Rows, Tick, Timeline};
 use crate::plant::zs9::{Adder, MotorMeans};
@@ -15,7 +15,7 @@ struct Sums {
     shorted: f64,
 }
 
-/// The plant at the instant where a row ends, and control's report until then.
+/// The plant at the instant at which a row ends, and control's report until then.
 pub struct Seen {
     pub source_v: f64,
     pub source_j: f64,
@@ -34,13 +34,13 @@ pub struct Spans {
 }
 
 impl Spans {
-    /// None yet, from the recording's beginning on, for so long, in s.
+    /// No rows yet, from the recording's beginning on, for a duration in s.
     pub fn new(step_s: f64, duration_s: f64, time: &Timeline) -> Self {
         let rows = Rows::new(step_s, duration_s, time);
         Self { wanted: rows.until(duration_s), rows, sums: Sums::default(), plant: Adder::default() }
     }
 
-    /// The time at which the next one ends.
+    /// The time at which the next row ends.
     pub const fn next(&self) -> Tick {
         self.rows.next
     }
@@ -50,22 +50,22 @@ impl Spans {
         &mut self.rows.next
     }
 
-    /// The recording ends at a time, in s, if it does not end before.
+    /// Ends the recording at a time, in s, unless it ends before.
     pub fn end_at(&mut self, end_s: f64) {
         self.wanted = self.wanted.min(self.rows.until(end_s));
     }
 
-    /// The recording has no end.
+    /// Makes the recording endless.
     pub const fn end_never(&mut self) {
         self.wanted = u64::MAX;
     }
 
-    /// `true` if the last one has ended.
+    /// `true` if the last row has ended.
     pub fn are_all(&self) -> bool {
         self.rows.has(self.wanted)
     }
 
-    /// So many steps pass with this source, these torque references and loads, and a link that is shorted or is not.
+    /// Lets this many steps pass with this source, these torque references and loads, and a link that is shorted or not.
     pub fn pass(
         &mut self,
         steps: f64,
@@ -85,7 +85,7 @@ impl Spans {
         }
     }
 
-    /// The plant's sums since a row of any step ended; the one that ends now is kept, if it has begun.
+    /// Takes the plant's sums since the last row of any step; keeps the row that ends now, if it has begun.
     pub fn record(&mut self, plant: &Adder, seen: &Seen, time: &Timeline) {
         self.plant.append(plant);
         if self.next() != time.now {
@@ -122,17 +122,17 @@ impl Spans {
         self.rows.push(row, time);
     }
 
-    /// Takes those there are.
+    /// Takes the rows so far.
     pub fn take(&mut self) -> Vec<Row> {
         self.rows.take()
     }
 
-    /// Those there are.
+    /// The rows so far.
     pub fn as_slice(&self) -> &[Row] {
         self.rows.as_slice()
     }
 
-    /// All of them.
+    /// All rows.
     pub fn into_vec(self) -> Vec<Row> {
         self.rows.into_vec()
     }

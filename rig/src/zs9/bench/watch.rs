@@ -23,20 +23,20 @@ impl Bench {
         let peaks = Peaks::at(currents_a.as_flattened(), id_a, self.plant.bridge_v(), v1.max(v2));
         let speeds = self.speeds_rpm().map(f64::abs);
         self.observed.note(self.time.now, &peaks, speeds[0].max(speeds[1]));
-        // Of a gate that stays off, [`Self::begin_period`] knows which pulses count.
+        // For a gate that stays off, [`Self::begin_period`] knows which pulses count.
         let disobey = !matches!(kind, Some(Kind::Gate(_, false))) && self.real_levels() != self.gates.levels;
         if disobey || self.plant.source_v < self.settings.limits.source_v {
             self.observed.makes_a_difference(self.time.now);
         }
     }
 
-    /// The energy that is stored in network and motors, and the height to which the capacitors go with the network's own oscillation.
+    /// The energy stored in network and motors, and the voltage to which the capacitors rise with the network's own oscillation.
     pub(super) fn stored(&self) -> Stored {
         let (parts, network) = (self.plant.parts, self.plant.network);
         let (source_v, link_v) = (self.plant.source_v, self.plant.link_v().max(self.plant.source_v));
         let surge_v = network.inductor_a() * (parts.inductance_h / parts.capacitance_f).sqrt();
         let unloaded_v = source_v + libm::hypot(network.capacitor_v() - source_v, surge_v);
-        // In series with the other motor each has a third of the link against it.
+        // In series with the other motor, each motor has a third of the link against it.
         let motors = &self.plant.motors;
         let stored = Stored::of(motors, link_v / 3.0, unloaded_v);
         let short_circuit_a =

@@ -23,12 +23,12 @@ use tractive::time::{Clock, Instant};
 /// The bench behind a board's ports; the first error ends the run.
 struct Port<'a> {
     bench: &'a mut Bench,
-    /// The bench's command beside the newest sample.
+    /// The bench's command that came with the newest sample.
     command: DualDriveCommand,
     error: Option<anyhow::Error>,
 }
 
-/// The drive's operator, and who asks it for something.
+/// The drive's operator, and the source of its requests.
 struct Wire<'w> {
     slot: DualSlot,
     operator: operator::Settings<'static>,
@@ -37,13 +37,13 @@ struct Wire<'w> {
 
 /// The source of the operator's requests.
 enum End<'w> {
-    /// The protocol: the drive's end of it, and who is at the other end.
+    /// The protocol: the drive's end of it, and the supervisor at the other end.
     Protocol(Box<Zs9CanEndpoint>, &'w mut dyn Supervisor),
-    /// Requests as they are.
+    /// Requests passed directly.
     Direct(Commander),
 }
 
-/// Somebody who says in every slot what is requested.
+/// Source of the request in every slot.
 pub type Commander = Box<dyn FnMut() -> DualRequest + Send>;
 
 /// The sample when there is nothing left to sample.
@@ -67,7 +67,7 @@ impl ControlPort<Dual> for Port<'_> {
         sample
     }
 
-    /// The scheme is the bench's in any case.
+    /// The scheme is always the bench's.
     fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DualDriveCommand) -> DualDriveCommand {
         if !self.bench.is_operated() {
             return self.command;
@@ -147,7 +147,7 @@ impl OperatorPort<DualDemands> for Idle<'_, '_, '_> {
     }
 }
 
-/// Both tasks and the cells between them.
+/// Both tasks and the cells that they share.
 pub struct Tasks<'a, L = Controller<false>> {
     control: ControlTask<&'static Tables, L>,
     pwm: PwmTask,
@@ -208,7 +208,7 @@ impl<'a, L: ControlLaw + Copy> Tasks<'a, L> {
         line: Option<Line>,
         end: impl FnOnce(&'static Ratings) -> End<'a>,
     ) -> Wire<'a> {
-        // One a run, for as long as the program lasts, as the tables are.
+        // One per run, kept for the program's lifetime like the tables.
         let ratings: &'static Ratings = Box::leak(Box::new(ratings));
         let operator = operator::Settings::rated(ratings, slot_s(&self.clock), line);
         Wire { slot: DualSlot::new(), operator, end: end(ratings) }
@@ -220,7 +220,7 @@ impl<'a, L: ControlLaw + Copy> Tasks<'a, L> {
         self
     }
 
-    /// The same with a protection off, or none; its levels are the tables' and the settings' business.
+    /// The same with one protection off, or none; the tables and the settings determine its levels.
     pub fn without(self, without: Option<Ablation>) -> Self {
         let masked = without.map_or(MaskedFaults::NONE, Ablation::masked);
         Self { control: self.control.without(masked), pwm: self.pwm.without(masked), ..self }
@@ -235,7 +235,7 @@ impl<'a, L: ControlLaw + Copy> Tasks<'a, L> {
 impl<L: ControlLaw + Copy> Interrupts for Tasks<'_, L> {
     type Bench = Bench;
 
-    /// They never meet: control comes at valleys, PWM at peaks.
+    /// The two never coincide: control comes at valleys, PWM at peaks.
     fn next_calls(&self) -> [Instant; 2] {
         [self.control.next_call(), self.pwm.next_call()]
     }
@@ -249,7 +249,7 @@ impl<L: ControlLaw + Copy> Interrupts for Tasks<'_, L> {
     fn control(&mut self, bench: &mut Bench) -> Result<()> {
         let mut port = Port { bench, command: DualDriveCommand::NONE, error: None };
         self.control.run(&mut port, &self.shared);
-        // The idle loop goes on where the interrupt ends.
+        // The idle loop continues after the interrupt.
         if let Some(Wire { slot, operator, end }) = &mut self.wire {
             let settings = match &*end {
                 End::Protocol(station, _) => station.settings(operator),

@@ -57,7 +57,7 @@ pub fn run_in_qemu(
     })
 }
 
-/// The name of a control interrupt's work: the scheme and the motors' direction, as `rthd-braking`.
+/// The name of a control interrupt's work: the scheme and the motors' state, as `rthd-braking`.
 fn what(report: &DualReport, speeds_rpm: [f64; 2]) -> String {
     let braking = report.torque_nm.iter().zip(speeds_rpm).any(|(nm, rpm)| f64::from(*nm) * rpm < 0.0);
     let does = match report {
