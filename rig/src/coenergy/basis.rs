@@ -2,7 +2,7 @@
 //!
 //! `W'(i_d, i_q) = Σ c_mn T_m(x) T_2n(y)` in Chebyshev polynomials of the scaled currents, `ψ_d = ∂W'/∂i_d`, `ψ_q = ∂W'/∂i_q`.
 
-/// Highest powers along d and along q; those that are used together lie below a straight line between them.
+/// Highest powers along d and along q; the pairs that are used lie below a straight line between them.
 const MOST_D: usize = 12;
 const MOST_Q: usize = 24;
 
@@ -56,13 +56,13 @@ impl Basis {
         self.terms.len()
     }
 
-    /// The part of each term in a derivative of the co-energy, of these orders along d and q, at a current in A.
+    /// The contribution of each term to a derivative of the co-energy, of these orders along d and q, at a current in A.
     pub fn derivative(&self, current: (f64, f64), orders: (usize, usize)) -> Vec<f64> {
         let [derivative] = self.derivatives::<1, 5>(current, [orders]);
         derivative
     }
 
-    /// The part of each term in the flux linkages along d and q at a current in A.
+    /// The contribution of each term to the flux linkages along d and q at a current in A.
     pub fn flux(&self, current: (f64, f64)) -> [Vec<f64>; 2] {
         self.derivatives::<2, 2>(current, [(1, 0), (0, 1)])
     }

@@ -1,4 +1,4 @@
-//! Linear equations of a co-energy's terms, their solution by least squares, and how sure it is.
+//! Linear equations of a co-energy's terms, their solution by least squares, and its certainty.
 
 use super::basis::Basis;
 use super::spread::Spread;
@@ -7,25 +7,25 @@ use nalgebra::{DMatrix, DVector};
 
 /// Rows of a block of the factorisation.
 const BLOCK: usize = 512;
-/// Currents along d and q at which the map's bends are weighed.
+/// Number of currents along d and q at which the map's bends are weighted.
 const GRID: (u32, u32) = (26, 18);
 
-/// Rows of equations: unknowns' coefficients, and what they are to give.
+/// Rows of equations: the unknowns' coefficients, and the right-hand sides.
 pub struct Equations {
     unknowns: usize,
     rows: Vec<f64>,
     right: Vec<f64>,
-    /// Rows that samples have made.
+    /// Number of rows that come from samples.
     samples: usize,
 }
 
 impl Equations {
-    /// Without a row yet.
+    /// Equations without a row yet.
     pub const fn new(unknowns: usize) -> Self {
         Self { unknowns, rows: Vec::new(), right: Vec::new(), samples: 0 }
     }
 
-    /// Takes the rows so far for samples: those to come are wishes.
+    /// Takes the rows so far as samples; the rows to come are wishes.
     pub const fn close_samples(&mut self) {
         self.samples = self.right.len();
     }
@@ -35,7 +35,7 @@ impl Equations {
         self.samples > 4 * self.unknowns
     }
 
-    /// Rows of samples, each with what it is to give as its last value, every one less the mean of all.
+    /// Adds rows of samples, each with its right-hand side as the last value, every row less the mean of all.
     pub fn add_from_mean(&mut self, rows: Vec<Vec<f64>>) {
         let count = rows.len() as f64;
         let mean: Vec<f64> =
@@ -47,14 +47,14 @@ impl Equations {
         }
     }
 
-    /// One more row: what the co-energy's terms are to give.
+    /// Adds a row: the coefficients of the co-energy's terms, and the right-hand side.
     pub fn add(&mut self, terms: impl IntoIterator<Item = f64>, gives: f64) {
         self.rows.extend(terms);
         self.right.push(gives);
         self.rows.resize(self.right.len() * self.unknowns, 0.0);
     }
 
-    /// The same with the unknowns beside the co-energy's terms known.
+    /// The same with known values for the unknowns besides the co-energy's terms.
     pub fn given(mut self, beside: &[f64]) -> Self {
         let terms = self.unknowns - beside.len();
         let rows = core::mem::take(&mut self.rows);
@@ -66,11 +66,11 @@ impl Equations {
         Self { unknowns: terms, ..self }
     }
 
-    /// The wish that the co-energy's derivatives of an order are small, all over the rectangle, with a weight beside a sample's residual.
+    /// Adds the wish that the co-energy's derivatives of an order are small all over the rectangle, weighted against a sample's residual.
     pub fn smooth(&mut self, basis: &Basis, order: usize, weight: f64) {
         let weight = weight * (self.samples as f64 / 2.0 / f64::from(GRID.0 * GRID.1)).sqrt();
         for current in basis.grid(GRID.0, GRID.1) {
-            // As much in every direction.
+            // Equal weight in every direction.
             let mut binomial = 1.0_f64;
             for along_q in 0..=order {
                 let along_d = order - along_q;
@@ -85,7 +85,7 @@ impl Equations {
     /// The solution by least squares.
     ///
     /// # Errors
-    /// Equations without one.
+    /// Equations without a unique solution.
     pub fn solve(&self) -> Result<Solution> {
         let lengths = self.lengths();
         let (factor, right) = self.factor(&lengths);
@@ -101,7 +101,7 @@ impl Equations {
         Ok(Solution { unknowns, left, spread: Spread { factor, lengths, sigma } })
     }
 
-    /// The rest of each sample's pair of rows, as the others alone foretell it: by the pair's own weight in the solution.
+    /// The residual of each sample's pair of rows when the others alone predict it: by the pair's own weight in the solution.
     pub fn left_out(&self, solution: &Solution) -> Vec<[f64; 2]> {
         let row = |k: usize| solution.spread.leverage(&self.rows[k * self.unknowns..(k + 1) * self.unknowns]);
         let pair = |k: usize| {
@@ -114,7 +114,7 @@ impl Equations {
         (0..self.samples).step_by(2).map(pair).collect()
     }
 
-    /// The lengths of the columns, by which they are divided, so that rounding treats all alike.
+    /// The columns' lengths, by which they are divided so that rounding affects all alike.
     fn lengths(&self) -> Vec<f64> {
         let mut squares = vec![0.0; self.unknowns];
         for row in self.rows.chunks_exact(self.unknowns) {
@@ -123,8 +123,8 @@ impl Equations {
         squares.into_iter().map(|square: f64| square.sqrt().max(f64::MIN_POSITIVE)).collect()
     }
 
-    /// The triangular factor of the rows and what it is to give, by QR of one block of them after the other below the factor of those before: a block stays in
-    /// the processor's cache.
+    /// The triangular factor of the rows and its right-hand side, by QR of one block of rows after the other below the factor of those before: a
+    /// block stays in the processor's cache.
     fn factor(&self, lengths: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
         let unknowns = self.unknowns;
         let mut factor = DMatrix::zeros(0, unknowns + 1);
@@ -143,7 +143,7 @@ impl Equations {
         (factor.view((0, 0), (unknowns, unknowns)).into_owned(), right)
     }
 
-    /// The rest of a row that the unknowns leave.
+    /// The residual of a row with these unknowns.
     fn left(&self, row: usize, unknowns: &[f64]) -> f64 {
         let own = &self.rows[row * self.unknowns..(row + 1) * self.unknowns];
         self.right[row] - own.iter().zip(unknowns).map(|(a, b)| a * b).sum::<f64>()
@@ -154,7 +154,7 @@ impl Equations {
 pub struct Solution {
     /// The unknowns.
     pub unknowns: Vec<f64>,
-    /// The rest of each sample's row.
+    /// The residual of each sample's row.
     pub left: Vec<f64>,
     /// Its covariance.
     pub spread: Spread,
@@ -164,7 +164,7 @@ pub struct Solution {
 mod tests {
     use super::*;
 
-    /// Samples of a polynomial and a little beside it, less one pair of rows, with a wish for smoothness.
+    /// Samples of a polynomial with a small deviation, without one pair of rows, with a wish for smoothness.
     fn equations(basis: &Basis, without: Option<usize>) -> Equations {
         let mut equations = Equations::new(basis.len());
         for k in (0..150).filter(|k| Some(*k) != without) {
@@ -184,7 +184,7 @@ mod tests {
         let all = equations(&basis, None);
         let told = all.left_out(&all.solve().unwrap());
         for k in [0, 30, 149] {
-            // The wishes' weight goes with the samples' number.
+            // The wishes' weight depends on the number of samples.
             let mut others = equations(&basis, Some(k));
             let wishes = others.samples * others.unknowns;
             let scale = (150.0_f64 / 149.0).sqrt();

@@ -22,13 +22,13 @@ impl Polynomial {
         (self.sum(&d), self.sum(&q))
     }
 
-    /// Incremental inductances, in H: of d, of both, of q.
+    /// Incremental inductances, in H: along d, between d and q, along q.
     pub fn inductances(&self, current: (f64, f64)) -> [f64; 3] {
         [(2, 0), (1, 1), (0, 2)].map(|orders| self.sum(&self.basis.derivative(current, orders)))
     }
 
-    /// Flux linkages at a current in A, which beyond a circle go on straight outward from it: with the incremental inductances that the circle has. As
-    /// these are not the same all around it, a part along the circle keeps both the derivatives of one co-energy, `W + W_r h + W_rr h²/2`.
+    /// Flux linkages at a current in A. Beyond a circle they continue straight outward from it, with the incremental inductances on the circle. As
+    /// these vary around it, a part along the circle keeps both the derivatives of one co-energy, `W + W_r h + W_rr h²/2`.
     pub fn flux_further(&self, current: (f64, f64), from_a: f64) -> (f64, f64) {
         let r = current.0.hypot(current.1);
         if r <= from_a {

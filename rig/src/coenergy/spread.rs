@@ -11,8 +11,8 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Standard error of a sum of the unknowns with these shares, those beyond being 0, as far as what is left of the samples is noise: each
-    /// sample's own.
+    /// Standard error of a sum of the unknowns with these shares, missing ones being 0, provided that the samples' residuals are noise,
+    /// independent from sample to sample.
     pub fn error(&self, shares: &[f64]) -> f64 {
         self.sigma * self.leverage(shares).norm()
     }

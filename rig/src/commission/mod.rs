@@ -1,12 +1,12 @@
 //! `cargo rig commission`: an unknown machine brought to its first torque, step by step, on the rig, in QEMU or on a board over CAN.
 //!
-//! 1. **Wiring**: the link charged and discharged, gates off: its voltage, and the currents' readings where none flows.
-//! 2. **Identification**, with a free rotor; of its observations order, signs and offsets of sensors and the angle's zero and direction are told as
-//!    well.
-//! 3. **Tables**: the machine folder, as the table generator takes it.
-//! 4. **First torque** with these tables, a little of it, and whether what flows is what was asked for.
+//! 1. **Wiring**: the link is charged and discharged, gates off: its voltage, and the current readings while no current flows.
+//! 2. **Identification**, with a free rotor; from its observations the order, signs and offsets of the sensors and the angle's zero and
+//!    direction are reported as well.
+//! 3. **Tables**: the machine folder, as the table generator reads it.
+//! 4. **First torque** with these tables: a small torque, and whether the torque that results is what was asked for.
 //!
-//! What each step found stands in a record, also where one has not passed; then the next ones are not done.
+//! Each step's results are kept in a record, also if the step has not passed; the steps after it are then not done.
 
 mod options;
 mod record;
@@ -23,7 +23,7 @@ use anyhow::{Context, Result, bail};
 use std::io::{BufRead, Write};
 use std::process::ExitCode;
 
-/// Leads through the steps. Exit code 1 where one has not passed.
+/// Leads through the steps. Exit code 1 if one has not passed.
 ///
 /// # Errors
 /// Options that make no sense, and what [`crate::identify::command`] and a talk may refuse.
@@ -52,7 +52,7 @@ pub fn command(commission: &Commission) -> Result<ExitCode> {
         crate::say!("{done}");
         let passed = done.passed;
         record.steps.push(done);
-        // As far as it has come, whatever comes next.
+        // The record so far, whatever comes next.
         record.write(&path)?;
         if !passed || commission.until.as_deref() == Some(step.name) {
             break;

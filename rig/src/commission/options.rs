@@ -16,7 +16,7 @@ pub struct Commission {
     /// End after this step: wiring, identification, tables.
     #[arg(long, value_name = "STEP", value_parser = ["wiring", "identification", "tables"])]
     pub until: Option<String>,
-    /// Go on where the record ends: what has passed is not done again.
+    /// Go on where the record ends; steps that have passed are not repeated.
     #[arg(long)]
     pub resume: bool,
     /// With --on qemu: the drive's image with the tables that were made, for the first torque.

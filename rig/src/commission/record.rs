@@ -35,7 +35,7 @@ impl Step {
         self.found.insert(name.to_owned(), value);
     }
 
-    /// Notes a number that is to lie between two others; it has not passed otherwise.
+    /// Notes a number that must lie between two others for the step to pass.
     pub fn within(&mut self, name: &str, value: f64, [least, most]: [f64; 2]) {
         self.find(name, value);
         if !(least..=most).contains(&value) {
@@ -43,12 +43,12 @@ impl Step {
         }
     }
 
-    /// Says what mends it.
+    /// Notes what mends it.
     pub fn advise(&mut self, advice: String) {
         self.advice.push(advice);
     }
 
-    /// It has not passed, and why.
+    /// Marks the step as not passed, with the reason.
     pub fn fail(&mut self, complaint: String) {
         self.passed = false;
         self.complaints.push(complaint);
@@ -98,7 +98,7 @@ impl Record {
         }
     }
 
-    /// The steps of one that ended early, as far as they have passed, of the same machine at the same place.
+    /// The steps of a record that ended early, as far as they have passed, for the same machine at the same place.
     ///
     /// # Errors
     /// A file that cannot be read, and a record of something else.
@@ -116,7 +116,7 @@ impl Record {
         Ok(Self { began_unix_s: before.began_unix_s, steps, ..self })
     }
 
-    /// A number that a step found; `None` if it has not.
+    /// A number that a step found; `None` if none did.
     pub fn found(&self, name: &str) -> Option<f64> {
         self.steps.iter().find_map(|step| step.found.get(name)).copied()
     }

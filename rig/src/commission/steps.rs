@@ -15,7 +15,7 @@ use anyhow::{Result, bail};
 use core::f64::consts::TAU;
 use tractive::protection::Fault;
 
-/// A step, and what it asks of the person who does it.
+/// A step, and its demands on the person who does it.
 pub struct Stage {
     /// Its name.
     pub name: &'static str,
@@ -52,21 +52,21 @@ pub const ALL: &[Stage] = &[
     },
 ];
 
-/// Share of the largest torque that the first one is, and its times: up, held, in s.
+/// The first torque as a share of the largest, and its times: up, held, in s.
 const TORQUE_SHARE: f64 = 0.05;
 const HELD_S: f64 = 0.3;
 const RAMP_S: f64 = 0.1;
-/// Reading without current, as a share of the largest; error of the angle's zero that is to be mended, and the most with which the machine is
-/// found, in degrees; torque off what was asked for, as a share of the largest.
+/// Reading without current, as a share of the largest; error of the angle's zero from which it is to be corrected, and the largest with which
+/// the machine is identified, in degrees; deviation of the torque from what was asked for, as a share of the largest.
 const REST_SHARE: f64 = 0.02;
 const ZERO_DEG: f64 = 1.0;
 const MOST_ZERO_DEG: f64 = 20.0;
 const RESPONSE_DEG: f64 = 20.0;
 const TORQUE_OFF_SHARE: f64 = 0.02;
 
-/// An error of the angle's zero by which a free rotor turns away, at least, in degrees.
+/// Least error of the angle's zero that makes a free rotor turn away, in degrees.
 const LEAST_ZERO_DEG: f64 = 2.0;
-/// The drive's fault of currents whose sum is not zero.
+/// Name of the drive's fault for currents whose sum is not zero.
 const PHASE_SUM: &str = Fault::PhaseSum.name();
 const ADVICE_SUM: &str = "current sensors: one or two have the wrong sign, so that what they read does not add up to zero: exchange the leads of \
     one after the other and begin anew";
@@ -90,7 +90,7 @@ fn talk(commission: &Commission, options: &Options, machine: &Machine, script: &
     Ok(talk)
 }
 
-/// The values of a column in the rows that a state names.
+/// The values of a column in the rows with a named state.
 fn told(talk: &Talk, state: &str, column: &str) -> Vec<f64> {
     let place = |name| System::Pmasynrm.column(name).unwrap_or_default();
     let (states, values) = (place("state"), place(column));
@@ -182,7 +182,7 @@ fn zero_off(zero_deg: f64) -> String {
     format!("power stage, encoder_zeros_deg: add about {zero_deg:.1}")
 }
 
-/// Advice on current sensors that read something else than their phases.
+/// Advice on current sensors that do not read their own phases.
 fn sensors_wrong(wiring: Option<Wiring>) -> String {
     match wiring {
         Some(wiring) => format!(
@@ -195,7 +195,7 @@ fn sensors_wrong(wiring: Option<Wiring>) -> String {
     }
 }
 
-/// Advice on an angle by which the rotor turns away.
+/// Advice on an angle with which the rotor turns away.
 fn turned_away(zero_deg: Option<f64>) -> String {
     match zero_deg {
         Some(zero_deg) if zero_deg.abs() > LEAST_ZERO_DEG => {
@@ -232,7 +232,7 @@ fn first_torque(commission: &Commission, machine: &Machine, record: &Record) -> 
         };
         options.run.image = Some(image.clone());
     }
-    // The rig does what a person does with the power stage's file.
+    // The rig makes the correction that a person makes in the power stage's file.
     if let (None, Some(zero_deg)) = (&identify.can, record.found("angle_zero_deg"))
         && zero_deg.abs() > ZERO_DEG
     {
@@ -247,7 +247,7 @@ fn first_torque(commission: &Commission, machine: &Machine, record: &Record) -> 
     let [inertia, friction_nm] =
         ["rotor_inertia_kg_m2", "friction_nm"].map(|name| record.found(name).unwrap_or(f64::NAN));
     let half_nm = friction_nm + 0.5 * parameters.max_speed_rpm * TAU / 60.0 * inertia / HELD_S;
-    // Of what is not known the other is the smaller one.
+    // If inertia or friction is not known, the minimum is the other value.
     let torque_nm = (TORQUE_SHARE * most_nm).min(half_nm);
     let script = format!(
         "wait 0.3\ncharge\nwait 4\nexpect state charged\nenable\nwait 0.2\nexpect state enabled\ntorque {torque_nm} over {RAMP_S}\nwait {HELD_S}\n\

@@ -1,4 +1,4 @@
-//! Faults that are injected, and their times: what is the same of both systems here, the kinds of each beside it.
+//! Injected faults and their times: the part common to both systems here, the kinds of each beside it.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod sensor;
@@ -18,15 +18,15 @@ pub struct Injection<K> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ControlFault {
-    /// It ends this many ticks after its deadline.
+    /// The interrupt ends this many ticks after its deadline.
     Late(u32),
-    /// It comes no more: no new commands.
+    /// The interrupt no longer comes: no new commands.
     Stopped,
 }
 
 /// Something that goes wrong.
 pub trait GoesWrong: Copy {
-    /// With the control interrupt.
+    /// The fault of the control interrupt, if it is one.
     fn control(self) -> Option<ControlFault>;
 }
 
@@ -46,12 +46,12 @@ impl<K: GoesWrong> Injected<K> {
         self.0.as_ref().filter(|injection| t_s >= injection.at_s - 1e-9).map(|injection| injection.kind)
     }
 
-    /// Time since it went wrong, in s; since the recording's beginning where nothing does.
+    /// Time since the fault began, in s; since the recording's beginning if there is none.
     pub fn since_s(&self, t_s: f64) -> f64 {
         t_s - self.0.as_ref().map_or(0.0, |injection| injection.at_s)
     }
 
-    /// By how much the control interrupt is late, in ticks.
+    /// Lateness of the control interrupt, in ticks.
     pub fn late_ticks(&self, t_s: f64) -> u32 {
         match self.kind(t_s).and_then(K::control) {
             Some(ControlFault::Late(ticks)) => ticks,

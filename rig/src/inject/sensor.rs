@@ -1,4 +1,4 @@
-//! Sensors that go wrong at an instant: what they read from then on.
+//! Sensors that fail at an instant, and their readings from then on.
 
 use rand::SeedableRng;
 use rand::rngs::StdRng;
@@ -15,7 +15,7 @@ pub enum CurrentFault {
     Stuck,
     /// Reads nothing.
     Open,
-    /// Reads this much too much, in A.
+    /// Reads too much by this offset, in A.
     Offset(f64),
     /// Reads this many times the current.
     Scaled(f64),
@@ -35,11 +35,11 @@ pub enum AngleFault {
     Frozen,
     /// Is off by this angle from then on.
     Jump(f64),
-    /// Is off by this angle once in so many samples.
+    /// Is off by this angle once in this many samples.
     Glitches(f64, u32),
     /// Counts the other way.
     Reversed,
-    /// Comes this many samples late.
+    /// Lags by this many samples.
     Late(usize),
 }
 
@@ -61,7 +61,7 @@ impl CurrentSpoiler {
         Self { phase, fault, last_a: 0.0, random: StdRng::seed_from_u64(SEED) }
     }
 
-    /// The reading where `true_a` flows.
+    /// The reading while `true_a` flows.
     pub fn read(&mut self, broken: bool, mut true_a: Abc) -> Abc {
         let reading = match self.phase {
             0 => &mut true_a.a,
@@ -104,7 +104,7 @@ impl AngleSpoiler {
         Self { fault, last: VecDeque::new(), broken_for: 0, broke_at: Angle::ZERO }
     }
 
-    /// The reading where the rotor stands at `angle`; once a sample.
+    /// The reading when the rotor is at `angle`; called once a sample.
     pub fn read(&mut self, broken: bool, angle: Angle) -> Angle {
         let kept = if let AngleFault::Late(samples) = self.fault { samples } else { 0 };
         self.last.push_back(angle);

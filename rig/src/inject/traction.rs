@@ -18,7 +18,7 @@ pub enum Kind {
     Gate(u8, bool),
     /// A device, in the order of [`crate::trace::GATES`], has failed and conducts for good.
     Device(u8),
-    /// The monitor of leg 0 ..= 2 tells of an output at the lower rail.
+    /// The monitor of leg 0 ..= 2 reports an output at the lower rail.
     Feedback(usize),
     /// The control interrupt.
     Control(ControlFault),
@@ -48,7 +48,7 @@ pub enum SupplyFault {
     Swinging(f64, f64),
 }
 
-/// Holds what a fault does to the samples.
+/// The effect of a fault on the samples.
 #[derive(Clone, Debug, Default)]
 pub struct Spoiler {
     /// The fault that is injected.
@@ -86,7 +86,7 @@ impl Spoiler {
         }
     }
 
-    /// Spoils control's sample, the currents apart, and its command.
+    /// Spoils control's sample, except the currents, and its command.
     pub fn control(&mut self, t_s: f64, sample: &mut Sample, command: &mut DriveCommand) {
         let kind = self.injected.kind(t_s);
         if let Some(sensor) = &mut self.angle {

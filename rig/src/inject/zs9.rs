@@ -13,7 +13,7 @@ use tractive::protection::Fault;
 pub enum Kind {
     /// The source is shorted.
     SourceShort,
-    /// The source is cut off: what feeds the network is the capacitor behind its contactor.
+    /// The source is cut off: the capacitor behind its contactor feeds the network.
     SourceLost,
     /// The source falls to 250 V.
     SourceLow,
@@ -33,9 +33,9 @@ pub enum Kind {
     Overcurrent,
     /// A phase current reads as not a number.
     NotFinite,
-    /// The leg v, middle gate: is never seen off.
+    /// Leg v, middle gate: never seen off.
     LegStuckOn,
-    /// The leg w, upper gate: is never seen on.
+    /// Leg w, upper gate: never seen on.
     LegStuckOff,
     /// The current sensor of phase 0 ..= 2 of motor 0 or 1.
     Current(usize, usize, CurrentFault),
@@ -46,7 +46,7 @@ pub enum Kind {
     Gate(u8, bool),
     /// All gates of leg 0 ..= 2 are on, until the gates are turned off for good.
     ShootThrough(u8),
-    /// The source's switch does not turn on any more: its diode is left.
+    /// The source's switch no longer turns on; only its diode is left.
     SourceSwitchOpen,
     /// The source swings by this amplitude (V) at this frequency (Hz).
     SourceSwings(f64, f64),
@@ -56,7 +56,7 @@ pub enum Kind {
     Control(ControlFault),
     /// A torque demand is NaN.
     DemandNotFinite,
-    /// A link voltage is wanted that needs too much shoot-through.
+    /// The demanded link voltage needs too much shoot-through.
     LinkOutOfRange,
     /// The gate drivers are not ready for 50 ms.
     GateDriver,
@@ -105,7 +105,7 @@ impl FromStr for Injection<Kind> {
     }
 }
 
-/// Holds what a fault does to the samples.
+/// The effect of a fault on the samples.
 #[derive(Clone, Debug, Default)]
 pub struct Spoiler {
     /// The fault that is injected.

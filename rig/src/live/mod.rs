@@ -1,5 +1,5 @@
-//! `rig live`: the live page of a drive that is elsewhere, in QEMU, on the host, or on a CAN bus. The page looks; commands need to be permitted
-//! by an option, and to be switched on in the page.
+//! `rig live`: the live page of a drive that is elsewhere, in QEMU, on the host, or on a CAN bus. The page shows; commands must be permitted
+//! by an option and switched on in the page.
 
 mod relay;
 mod server;
@@ -24,7 +24,7 @@ struct Page {
     /// A CAN interface of this machine, as can0: the drive is on its bus, and nothing is simulated.
     #[arg(long, value_name = "INTERFACE")]
     can: Option<String>,
-    /// Permit commands; they are sent once they are switched on in the page, too.
+    /// Permit commands; they are sent only once they are also switched on in the page.
     #[arg(long)]
     commands: bool,
     /// Port of the server on this machine; 0: any.
@@ -42,11 +42,11 @@ struct Page {
 #[derive(Clone, Debug)]
 pub struct LiveOptions {
     page: Page,
-    /// The drive that is looked at.
+    /// The drive that is shown.
     pub drive: DriveOptions,
 }
 
-/// Step of what a simulated drive records meanwhile, in s: nobody asks for it.
+/// Step of a simulated drive's recording, in s, which nobody asks for.
 const UNSEEN_STEP_S: f64 = 0.1;
 
 impl LiveOptions {

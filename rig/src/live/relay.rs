@@ -1,4 +1,4 @@
-//! The supervisor that relays: the telemetry to the page, and the page's lines to the drive where they are switched on.
+//! The supervisor that relays the telemetry to the page, and the page's lines to the drive if commands are switched on.
 
 use super::shared::{Row, Shared};
 use crate::run::{Supervisor, Turn};
@@ -50,7 +50,7 @@ pub fn columns(system: System) -> Vec<&'static str> {
     told(system).iter().map(|(name, _)| *name).chain(["mode"]).collect()
 }
 
-/// It.
+/// The supervisor that relays.
 pub struct Relay {
     system: System,
     talk: Talk,
@@ -60,18 +60,18 @@ pub struct Relay {
 }
 
 impl Relay {
-    /// To a drive of a system whose rotor has an inertia in kg·m², of a machine of these ratings.
+    /// A relay to a drive of a system whose rotor has an inertia in kg·m², of a machine of these ratings.
     pub fn new(system: System, inertia_kg_m2: f64, ratings: &Ratings, shared: Arc<Shared>) -> Self {
         let talk = Talk::new(system, Lines::Said, inertia_kg_m2, ratings);
         Self { system, talk, shared, began: Instant::now(), refused: None }
     }
 
-    /// Time since it was made, in s.
+    /// Time since the relay was made, in s.
     pub fn time_s(&self) -> f64 {
         self.began.elapsed().as_secs_f64()
     }
 
-    /// The place of a name in the telemetry among codes, for the page: 0 is off.
+    /// The code of the mode in the telemetry, for the page: 0 is off.
     fn mode(&self, row: &[String]) -> f64 {
         let say = |column: &str| self.system.column(column).map_or("", |place| row[place].as_str());
         let place = match self.system {
@@ -84,7 +84,7 @@ impl Relay {
         place.unwrap_or(0) as f64
     }
 
-    /// The drive's word in the page's words.
+    /// The drive's state in the page's terms.
     fn state(&self, t_s: f64, row: &[String]) -> Value {
         let say = |column: &str| self.system.column(column).map_or("", |place| row[place].as_str());
         let known = |column: &str| Some(say(column)).filter(|word| !word.is_empty());
@@ -104,7 +104,7 @@ impl Relay {
 
 impl Supervisor for Relay {
     fn slot(&mut self, t_s: f64) -> Result<Turn> {
-        // In the clock's pace, or slower where the drive is.
+        // At the clock's pace, or slower if the drive is.
         let early_s = t_s - self.time_s();
         if early_s > 0.0 {
             std::thread::sleep(Duration::from_secs_f64(early_s));
@@ -128,7 +128,7 @@ impl Supervisor for Relay {
         }
     }
 
-    /// Somebody may look for as long as he likes.
+    /// The page may be watched for any length of time.
     fn is_typed(&self) -> bool {
         true
     }
@@ -146,7 +146,7 @@ mod tests {
     use tractive::protocol::e2e::Counter;
     use tractive::protocol::{COMMAND, FROM_DRIVE, Payload};
 
-    /// A bus with frames that come, and those that were sent.
+    /// A bus with incoming frames, and the frames that were sent.
     struct Fake {
         come: VecDeque<Frame>,
         sent: Vec<Frame>,

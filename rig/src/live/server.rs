@@ -13,7 +13,7 @@ type File = (&'static str, &'static str, &'static str);
 const JS: &str = "text/javascript; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 
-/// The page, with the drive elsewhere in place of the simulation.
+/// The page, with a drive elsewhere in place of the simulation.
 const FILES: [File; 11] = [
     ("/", "text/html; charset=utf-8", include_str!("../../../live/page/index.html")),
     ("/style.css", CSS, include_str!("../../../live/page/style.css")),
@@ -35,14 +35,14 @@ const LONGEST_LINE: u64 = 200;
 
 type Answer = Response<Cursor<Vec<u8>>>;
 
-/// Serves behind the program's back; its address.
+/// Serves in the background; returns the address.
 pub fn serve(port: u16, about: Value, shared: Arc<Shared>) -> Result<String> {
     let server = Server::http(("127.0.0.1", port)).map_err(|error| anyhow!("--port {port}: {error}"))?;
     let port = server.server_addr().to_ip().map_or(port, |address| address.port());
     std::thread::spawn(move || {
         for mut request in server.incoming_requests() {
             let answer = answer(&mut request, &about, &shared, port);
-            // What the browser at the other end does with it is its own business.
+            // A browser that does not take the answer is no concern of the server.
             let _ = request.respond(answer);
         }
     });
@@ -80,7 +80,7 @@ fn answer(request: &mut Request, about: &Value, shared: &Shared, port: u16) -> A
     }
 }
 
-/// `true` for a request that names this server as its host, and, where it commands, comes from its own page.
+/// `true` for a request that names this server as its host and, if it commands, comes from its own page.
 fn is_own(request: &Request, port: u16) -> bool {
     let header = |name: &'static str| {
         request.headers().iter().find(|header| header.field.equiv(name)).map(|header| header.value.as_str())

@@ -1,4 +1,4 @@
-//! The data that the drive's side and the page's side hand each other.
+//! The data that the drive's side and the page's side exchange.
 
 use serde_json::{Value, json};
 use std::collections::VecDeque;
@@ -11,7 +11,7 @@ const KEPT: usize = 1000;
 /// Lines that may wait.
 const MOST_LINES: usize = 100;
 
-/// A row of telemetry: what was not told is `None`.
+/// A row of telemetry; a value that was not sent is `None`.
 pub type Row = Vec<Option<f64>>;
 
 #[derive(Default)]
@@ -24,14 +24,14 @@ struct Inner {
     lines: VecDeque<String>,
 }
 
-/// It.
+/// The shared data.
 pub struct Shared {
     permitted: bool,
     inner: Mutex<Inner>,
 }
 
 impl Shared {
-    /// Nothing told; commands are permitted or not.
+    /// The data before any telemetry; commands are permitted or not.
     pub fn new(permitted: bool) -> Self {
         Self { permitted, inner: Mutex::default() }
     }
@@ -40,7 +40,7 @@ impl Shared {
         does(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// A row that was told at a time in s, with the drive's word. Rows that were lost on the way are as the one before.
+    /// Puts a row that was received at a time in s, with the drive's state. Rows lost on the way repeat the one before.
     pub fn put(&self, t_s: f64, row: Row, state: Value) {
         let place = (t_s / STEP_S).round().max(0.0) as usize;
         self.with(|inner| {
@@ -60,7 +60,7 @@ impl Shared {
         });
     }
 
-    /// The rows from a number on, and the drive's word.
+    /// The rows from a number on, and the drive's state.
     pub fn rows(&self, from: usize) -> Value {
         self.with(|inner| {
             let from = from.max(inner.first);
@@ -69,7 +69,7 @@ impl Shared {
         })
     }
 
-    /// Commands are sent from now on, or no longer. The error says why not.
+    /// Sends commands from now on, or no longer. The error says why not.
     pub fn arm(&self, armed: bool) -> Result<(), &'static str> {
         if armed && !self.permitted {
             return Err("commands are not permitted: --commands permits them");
@@ -86,7 +86,7 @@ impl Shared {
         self.with(|inner| inner.armed)
     }
 
-    /// A line for the drive, as in a script of `talk`. The error says why it is not taken.
+    /// Takes a line for the drive, as in a script of `talk`. The error says why it is refused.
     pub fn say(&self, line: &str) -> Result<(), &'static str> {
         self.with(|inner| match () {
             () if !inner.armed => Err("commands are not switched on"),

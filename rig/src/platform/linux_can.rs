@@ -5,7 +5,7 @@ use anyhow::{Context, Result};
 use socketcan::{CanDataFrame, CanFrame, CanSocket, EmbeddedFrame, Id, ShouldRetry, Socket as _, StandardId};
 use tractive::protocol::Frame;
 
-/// A SocketCAN socket that does not wait.
+/// A SocketCAN socket that does not block.
 pub(crate) struct Socket(CanSocket);
 
 impl Socket {
@@ -22,7 +22,7 @@ impl Socket {
 impl Bus for Socket {
     fn send(&mut self, frame: &Frame) -> Result<()> {
         match self.0.write_frame(&to_bus(frame)?) {
-            // A queue that is full loses a frame, as the drive's counters will tell.
+            // A full queue loses a frame; the drive's counters will show it.
             Err(error) if error.should_retry() => Ok(()),
             sent => Ok(sent?),
         }
@@ -36,7 +36,7 @@ impl Bus for Socket {
                         return Ok(Some(frame));
                     }
                 }
-                // Neither remote frames nor a bus's errors are anything to the protocol.
+                // The protocol uses neither remote frames nor bus errors.
                 Ok(_) => {}
                 Err(error) if error.should_retry() => return Ok(None),
                 Err(error) => return Err(error.into()),
@@ -51,7 +51,7 @@ fn to_bus(frame: &Frame) -> Result<CanDataFrame> {
     CanDataFrame::new(id, &frame.data[..length]).context("more than eight bytes")
 }
 
-/// The frame as the protocol has it; `None` for an extended identifier.
+/// The frame in the protocol's form; `None` for an extended identifier.
 fn from_bus(frame: &CanDataFrame) -> Option<Frame> {
     let Id::Standard(id) = frame.id() else { return None };
     let mut data = [0; 8];

@@ -4,7 +4,7 @@ use crate::can::Bus;
 use anyhow::{Result, bail};
 use tractive::protocol::Frame;
 
-/// A socket that there is not.
+/// A socket that cannot exist.
 pub(crate) enum Socket {}
 
 impl Socket {

@@ -17,7 +17,7 @@ pub(crate) fn commit() -> Option<String> {
     None
 }
 
-/// The progress of a run, which nobody is shown.
+/// The progress of a run, which is not shown.
 pub(crate) struct Progress;
 
 impl Progress {
@@ -28,7 +28,7 @@ impl Progress {
     pub(crate) fn show(&mut self, _done: f64) {}
 }
 
-/// A folder that there is not.
+/// A folder that does not exist.
 pub(crate) struct NoFolder(PathBuf);
 
 impl NoFolder {
@@ -38,12 +38,12 @@ impl NoFolder {
     }
 }
 
-/// None: an error.
+/// No temporary folder: an error.
 pub(crate) fn temporary_folder() -> Result<NoFolder> {
     bail!("there are no folders here")
 }
 
-/// None: an error.
+/// No FIFO: an error.
 pub(crate) fn make_fifo(path: &Path) -> Result<()> {
     bail!("{}: there are no pipes here", path.display())
 }

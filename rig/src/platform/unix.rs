@@ -20,7 +20,7 @@ pub fn processor_s() -> f64 {
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
-/// The commit that the repository of this program's sources stands at, `-dirty` behind it where a file differs; nothing without a repository.
+/// The commit that the repository of this program's sources stands at, followed by `-dirty` if a file differs; nothing without a repository.
 pub(crate) fn commit() -> Option<String> {
     const WORDS: [&str; 6] = ["describe", "--always", "--dirty", "--abbrev=12", "--exclude", "*"];
     let told = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR")]).args(WORDS).output().ok()?;
@@ -39,7 +39,7 @@ impl Progress {
 
     pub(crate) fn new(name: &str) -> Self {
         let template = "{msg:16} [{bar:40}] {percent:>3} % {elapsed} (left {eta})";
-        // A talk is as long as its lines say, and tells its state instead.
+        // A talk lasts as long as its lines say, and shows its state instead.
         let bar = if name == "talk" { ProgressBar::hidden() } else { bar(Self::STEPS, template) };
         Self { bar: bar.with_message(name.to_owned()), calls: 0 }
     }
@@ -58,7 +58,7 @@ impl Drop for Progress {
     }
 }
 
-/// A folder that is gone with its value.
+/// A folder that is removed with its value.
 pub(crate) fn temporary_folder() -> Result<TempDir> {
     tempfile::tempdir().context("no temporary folder for the link")
 }
@@ -81,7 +81,7 @@ pub(crate) fn written(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<(
     Ok(())
 }
 
-/// Writes a folder whole or not at all; one that has `taken` its place is exchanged for it.
+/// Writes a folder whole or not at all; an existing one that has `taken` its place is exchanged for it.
 pub(crate) fn written_folder(out: &Path, taken: bool, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let failed = || format!("--out {}", out.display());
@@ -90,7 +90,7 @@ pub(crate) fn written_folder(out: &Path, taken: bool, fill: impl FnOnce(&Path) -
     fill(beside.path())?;
     std::fs::set_permissions(beside.path(), std::fs::Permissions::from_mode(0o755)).with_context(failed)?;
     if taken {
-        // The old one goes with the temporary folder.
+        // The old folder is removed with the temporary one.
         renameat_with(CWD, beside.path(), CWD, out, RenameFlags::EXCHANGE).with_context(failed)
     } else {
         std::fs::rename(beside.path(), out).with_context(failed)

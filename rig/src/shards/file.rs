@@ -27,7 +27,7 @@ struct Header {
     plan: Plan,
 }
 
-/// A shard's file: what it is of, and the rows that are done.
+/// A shard's file: its campaign and share, and the rows that are done.
 #[derive(Clone, Debug)]
 pub struct ShardFile {
     /// The campaign.
@@ -39,7 +39,7 @@ pub struct ShardFile {
 }
 
 impl ShardFile {
-    /// The file as it was left, or an empty one. Fails where the file is another campaign's.
+    /// The file as it was left, or an empty one. Fails if the file is another campaign's.
     pub fn resumed(path: &Path, plan: &Plan, shard: Shard) -> Result<Self> {
         if !path.exists() {
             return Ok(Self { plan: plan.clone(), shard, rows: BTreeMap::new() });

@@ -1,4 +1,4 @@
-//! The shards' files made one.
+//! The merging of the shards' files.
 
 use super::file::{ShardFile, difference, name};
 use super::{Plan, Shard};
@@ -16,13 +16,13 @@ pub struct Merged {
 }
 
 impl Merged {
-    /// As a CSV.
+    /// The rows as a CSV.
     pub fn csv(&self) -> String {
         let lines = std::iter::once(&self.plan.columns).chain(&self.rows);
         lines.flat_map(|line| [line.as_str(), "\n"]).collect()
     }
 
-    /// Its rows, read.
+    /// The rows, parsed.
     pub fn read<R: serde::de::DeserializeOwned>(&self) -> Result<Vec<R>> {
         let text = self.csv();
         let mut reader = csv::Reader::from_reader(text.as_bytes());

@@ -1,8 +1,8 @@
-//! Campaigns past one machine: each shard does its share of the runs and leaves one file, and the files merge into the very bytes that
-//! one shard alone would have left.
+//! Campaigns on more than one computer: each shard does its share of the runs and leaves one file, and the files merge into exactly the bytes
+//! that one shard alone would have left.
 //!
-//! A shard's file is a line of JSON behind `# `, which says of what campaign it is, and a CSV with the number of each run. It is written
-//! whole or not at all, every few runs; a shard that is started again does what is not in its file yet.
+//! A shard's file is a line of JSON after `# `, which identifies its campaign, and a CSV with the number of each run. It is written
+//! whole or not at all, every few runs; a restarted shard does the runs that are not in its file yet.
 
 mod file;
 mod merge;
@@ -20,7 +20,7 @@ use std::path::Path;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-/// A share of a campaign's runs: of `count` shards, which take the runs in turn, the one with this number.
+/// A share of a campaign's runs: the one with this number of `count` shards, which take the runs in turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Shard {
     /// Its number, from 0.
@@ -33,7 +33,7 @@ impl Shard {
     /// All runs.
     pub const WHOLE: Self = Self { shard: 0, shards: 1 };
 
-    /// `true` if the run is one of its own.
+    /// `true` if the run belongs to this shard.
     pub const fn has(self, run: usize) -> bool {
         run % self.shards == self.shard
     }
@@ -59,7 +59,7 @@ impl FromStr for Shard {
     }
 }
 
-/// A campaign, by all that decides on its results.
+/// A campaign, described by everything that determines its results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Its name: faults, healthy, random, points.
@@ -68,7 +68,7 @@ pub struct Plan {
     pub configuration: serde_json::Value,
     /// The number of its runs.
     pub runs: usize,
-    /// The program that runs it, by the hash of its bytes: another commit's is another one.
+    /// The program that runs it, by the hash of its bytes: another commit's program differs.
     pub program: String,
     /// The head of its CSV, without the run's number.
     pub columns: String,
@@ -112,7 +112,7 @@ pub fn seed(campaign: &str, run: u64) -> u64 {
 
 /// The number of runs that are done at once.
 const BLOCK: usize = 16;
-/// The time between two writings of a shard's file, at least.
+/// Least time between two writings of a shard's file.
 const PAUSE: Duration = Duration::from_secs(1);
 
 /// Does a shard's runs that are not in its file yet, each a row of the CSV, and writes the file into a folder.
@@ -185,7 +185,7 @@ mod tests {
         seeds.sort_unstable();
         seeds.dedup();
         assert_eq!(seeds.len(), 20_000);
-        // A change of the hash would make every published campaign another one.
+        // A change of the hash would change every published campaign.
         assert_eq!(seed("a", 0), 0x407a_628d_9394_c9ca);
     }
 }

@@ -1,4 +1,4 @@
-//! The source of the lines: a script, read whole before anything runs, or standard input, a line when it is wanted.
+//! The source of the lines: a script, read whole before anything runs, or standard input, read a line at a time when it is needed.
 
 use super::script::{self, Line};
 use super::system::System;
@@ -11,14 +11,14 @@ use std::path::Path;
 pub enum Lines {
     /// The rest of a script.
     Script(VecDeque<Line>),
-    /// Standard input, and how many lines were read.
+    /// Standard input, and the number of lines that were read.
     Typed(usize),
-    /// Nothing here: somebody else says lines, [`super::Talk::say`].
+    /// No source here: the lines come by [`super::Talk::say`].
     Said,
 }
 
 impl Lines {
-    /// A script's. The error names the file, the line and the word.
+    /// The lines of a script. The error names the file, the line and the word.
     pub fn of_script(path: &Path, system: System) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
@@ -26,22 +26,22 @@ impl Lines {
         Ok(Self::Script(lines.into()))
     }
 
-    /// Those of a text. The error names the line and the word.
+    /// The lines of a text. The error names the line and the word.
     pub fn of_text(text: &str, system: System) -> Result<Self> {
         Ok(Self::Script(script::script(text, system)?.into()))
     }
 
-    /// `true` if somebody types them.
+    /// `true` if the lines are typed.
     pub fn are_typed(&self) -> bool {
         matches!(self, Self::Typed(_))
     }
 
-    /// `true` if they have no end.
+    /// `true` if the lines have no end.
     pub fn are_said(&self) -> bool {
         matches!(self, Self::Said)
     }
 
-    /// The next line; `None` at the end. A line that cannot be understood is an error; on a terminal it is said and the next one
+    /// The next line; `None` at the end. A line that cannot be understood is an error; on a terminal it is reported and the next line
     /// is read.
     pub fn take(&mut self, system: System) -> Result<Option<Line>> {
         let count = match self {

@@ -31,7 +31,7 @@ impl Pattern for Code {
     }
 }
 
-/// All that the telemetry has said.
+/// Everything that the telemetry has reported.
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     system: System,
@@ -47,9 +47,9 @@ pub struct Listener {
     fault_value: Option<f32>,
     fault_limit: Option<f32>,
     answer: Option<ParameterAnswer>,
-    /// Frames that did not check, or were not in order.
+    /// Number of frames that failed the check or were out of order.
     pub errors: u32,
-    /// The frame that is on the scales of another machine.
+    /// The message about a frame on another machine's scales.
     pub foreign: Option<String>,
 }
 
@@ -67,7 +67,7 @@ fn foreign(message: &Message, scales: Scales) -> String {
 }
 
 impl Listener {
-    /// To a system on these scales, before its first frame.
+    /// A listener to a system on these scales, before its first frame.
     pub fn new(system: System, scales: Scales) -> Self {
         Self { system, scales, ..Self::default() }
     }
@@ -125,7 +125,7 @@ impl Listener {
         false
     }
 
-    /// The rotors' speeds as told, in r/min; of one rotor the first.
+    /// The rotors' speeds as reported, in r/min; for one rotor only the first.
     pub fn speeds_rpm(&self) -> [Option<f32>; 2] {
         match self.system {
             System::Pmasynrm => [self.measured.speed_rpm, None],

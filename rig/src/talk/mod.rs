@@ -1,4 +1,4 @@
-//! `rig talk`: commands the drive over the protocol, as a vehicle's computer would over CAN, and logs what it answers.
+//! `rig talk`: commands the drive over the protocol, as a vehicle's computer would over CAN, and logs its answers.
 
 mod lines;
 mod listener;
@@ -69,7 +69,7 @@ fn run_options(options: &DriveOptions) -> RunOptions {
     RunOptions { dt: Some(options.run.dt.unwrap_or(TRACE_STEP_S)), ..options.run.clone() }
 }
 
-/// The same as a run of the PMaSynRM drive takes them.
+/// The same options as a run of the PMaSynRM drive takes them.
 pub(crate) fn traction_options(options: &DriveOptions) -> traction::Options {
     Options { run: run_options(options), own: options.traction.clone() }
 }
@@ -77,7 +77,7 @@ pub(crate) fn traction_options(options: &DriveOptions) -> traction::Options {
 /// A rotor of this inertia, in kg·m², on a link, commanded over the protocol.
 ///
 /// # Errors
-/// Options that make no sense, or an emulator that does not do its part.
+/// Options that make no sense, or an emulator that fails.
 pub(crate) fn with_traction(
     options: &traction::Options,
     inertia_kg_m2: f64,
@@ -87,7 +87,7 @@ pub(crate) fn with_traction(
 ) -> Result<Recording> {
     Traction::check(options, &Map::new(), machine)?;
     let idle = Request::idle(&machine.tables.ratings);
-    // The frames ask, not this.
+    // The requests come from the frames, not from here.
     let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
     let plan = traction::Plan {
         judged_step_s: options.dt.unwrap_or(TRACE_STEP_S),
@@ -106,7 +106,7 @@ pub(crate) fn with_zs9(
 ) -> Result<zs9::trace::Recording> {
     let own = Options { run: run_options(options), own: options.zs9.clone() };
     Zs9::check(&own, &Map::new(), machine)?;
-    // What the operator permits takes the place of the demands.
+    // The demands that the operator permits replace these.
     let operator = |_: f64, _: zs9::SeenMotors| zs9::Orders {
         demands: [MotorDemand::Speed(0.0); 2],
         loads_nm: [0.0; 2],

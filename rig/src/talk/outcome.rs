@@ -103,7 +103,7 @@ impl Happened {
 
 /// A run that is over.
 pub struct Outcome {
-    /// The talk, as it was said and heard.
+    /// The talk, as sent and received.
     pub talk: Talk,
     /// The system that was talked to.
     pub system: System,

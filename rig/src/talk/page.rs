@@ -1,4 +1,4 @@
-//! The page of a talk: what the telemetry said beside what really happened.
+//! The page of a talk: the telemetry beside what really happened.
 
 use super::outcome::{Happened, Outcome, TalkOptions};
 use super::system::System;

@@ -7,9 +7,9 @@ use tractive::protocol::{LinkLimits, TorqueLimits};
 /// The action of a line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
-    /// Enables; with a torque that may stand already.
+    /// Enables; a torque may be demanded already.
     Enable {
-        /// The permission for a torque other than zero to come with it.
+        /// The permission for a torque other than zero at the same time.
         with_torque: bool,
     },
     /// Stops: torque to zero, gates off.
@@ -24,10 +24,10 @@ pub enum Action {
     Discharge,
     /// Acknowledges the fault.
     Acknowledge,
-    /// Torques, in N·m, along straight lines of this many seconds; of one motor the first.
+    /// Torques, in N·m, along linear ramps of this many seconds; for one motor only the first.
     Torque([f64; 2], f64),
-    /// Speeds in r/min, along straight lines of so many r/min per second: of one motor the first, held by a speed loop here; of two
-    /// held by the drive's own.
+    /// Speeds in r/min, along linear ramps of this many r/min per second: for one motor only the first, held by a speed loop here; for
+    /// two held by the drive's own loops.
     Speed([f64; 2], f64),
     /// The machines' loads against forward rotation, in N·m.
     Load([f64; 2]),
@@ -41,19 +41,19 @@ pub enum Action {
     Read(u8),
     /// Writes a parameter.
     Write(u8, f32),
-    /// Turns a bit in each of the next so many commands.
+    /// Flips a bit in each command, for this many commands.
     Corrupt(u32),
-    /// Cuts each of the next so many commands short.
+    /// Cuts each command short, for this many commands.
     Truncate(u32),
-    /// Sends so many old commands again.
+    /// Sends this many old commands again.
     Replay(u32),
     /// Sends the next two commands in the wrong order.
     Reorder,
-    /// Sends so many well-protected commands with a torque out of range.
+    /// Sends this many well-protected commands with a torque out of range.
     OutOfRange(u32),
-    /// Sends so many frames with an identifier that is none of the protocol's.
+    /// Sends this many frames with an identifier that the protocol does not have.
     Unknown(u32),
-    /// Sends nothing for so many milliseconds.
+    /// Sends nothing for this many milliseconds.
     Drop(u32),
     /// Waits, in s.
     Wait(f64),
@@ -70,7 +70,7 @@ pub struct Expectation {
     pub name: String,
     /// The value that it should have.
     pub value: String,
-    /// By how much a number may differ.
+    /// Largest deviation of a number.
     pub within: f64,
 }
 
@@ -105,7 +105,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// A number for each of so many motors.
+    /// A number for each of this many motors.
     fn each(&mut self, what: &str, motors: usize, [low, high]: [f64; 2]) -> Result<[f64; 2]> {
         let mut each = [0.0; 2];
         for number in each.iter_mut().take(motors) {
@@ -126,7 +126,7 @@ impl<'a> Words<'a> {
         Ok(Action::Load(self.each("load", motors, TORQUE)?))
     }
 
-    /// Of motor 0 or 1.
+    /// The limits of motor 0 or 1.
     fn limits(&mut self, motor: usize) -> Result<Action> {
         let [_, high_nm] = TORQUE;
         let limits = TorqueLimits {
@@ -167,7 +167,7 @@ impl<'a> Words<'a> {
         Ok(self.number(what, 1.0, 1e6)?.round() as u32)
     }
 
-    /// The number after a word that may be there, or what holds without it.
+    /// The number after an optional word, or the default without it.
     fn after(&mut self, word: &str, otherwise: f64, low: f64, high: f64) -> Result<f64> {
         match self.rest.next() {
             None => Ok(otherwise),
@@ -185,10 +185,10 @@ impl<'a> Words<'a> {
     }
 }
 
-/// A command with what follows it, as the help shows it, and what it is read as.
+/// A command with its arguments, as the help shows it, and its parser.
 pub type Command = (&'static str, fn(&mut Words) -> Result<Action>);
 
-/// The ZS9's commands, in the place of the PMaSynRM drive's.
+/// The ZS9's commands, in place of the PMaSynRM drive's.
 pub const ZS9_COMMANDS: [Command; 5] = [
     ("torque NM NM [over SECONDS]", |words| words.torque(2)),
     ("speed RPM RPM [at RPM_PER_SECOND]", |words| words.speed(2)),

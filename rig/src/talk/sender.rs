@@ -1,4 +1,4 @@
-//! The frames to the drive, slot by slot, and the injuries on their way.
+//! The frames to the drive, slot by slot, and the damage done to them on the way.
 
 use super::system::System;
 use std::collections::VecDeque;
@@ -15,9 +15,9 @@ use tractive::protocol::{
 pub struct Spoken {
     /// Levels.
     pub levels: Levels,
-    /// Torques, in N·m; of one motor the first.
+    /// Torques, in N·m; for one motor only the first.
     pub torques_nm: [f32; 2],
-    /// Speeds in r/min, in the torques' place.
+    /// Speeds in r/min, instead of the torques.
     pub speeds_rpm: Option<[f32; 2]>,
 }
 
@@ -46,19 +46,19 @@ pub const COMMAND_SLOTS: u64 = 10;
 const LIMIT_SLOTS: u64 = 100;
 /// Commands that are kept to be sent again.
 const KEPT: usize = 32;
-/// The identifier of the frames that nobody knows.
+/// The identifier of the unknown frames.
 const UNKNOWN_ID: u16 = 0x123;
 /// A raw torque far out of range.
 const TORQUE_OUT_OF_RANGE: Payload = Payload(0x7FFF << 16);
 
-/// A frame that is sent besides.
+/// An additional frame.
 #[derive(Clone, Copy, Debug)]
 enum Extra {
-    /// As it is.
+    /// A frame as it is.
     Frame(Frame),
     /// An old command: this many before the newest.
     Old(usize),
-    /// A command out of range, in its turn.
+    /// A command out of range, with the next counter value.
     OutOfRange,
 }
 
@@ -80,26 +80,26 @@ pub struct Sender {
     /// Parameters to ask for.
     pub requests: VecDeque<ParameterRequest>,
     kept: VecDeque<Frame>,
-    /// Frames to send besides.
+    /// Additional frames to send.
     extra: VecDeque<Extra>,
-    /// Commands in each of which a bit is still to be turned.
+    /// Number of commands in which a bit is still to be flipped.
     pub corrupt: u32,
-    /// Commands that are still to be cut short.
+    /// Number of commands that are still to be cut short.
     pub truncate: u32,
     turned: u32,
-    /// The command that waits for the next one to go first: `Some(None)` before it has come.
+    /// The command that is held back until the next one has gone: `Some(None)` before it has come.
     pub held: Option<Option<Frame>>,
     /// The first slot in which something is sent again.
     pub silent_until: u64,
 }
 
 impl Sender {
-    /// To a system on these scales, nothing sent yet.
+    /// A sender to a system on these scales, with nothing sent yet.
     pub fn new(system: System, scales: Scales) -> Self {
         Self { system, scales, ..Self::default() }
     }
 
-    /// Messages of a command, of a parameter.
+    /// Messages of a command and of a parameter.
     fn messages(&self) -> [&'static Message; 2] {
         match self.system {
             System::Pmasynrm => [&COMMAND, &PARAMETER_REQUEST],
@@ -133,7 +133,7 @@ impl Sender {
         self.extra.extend((0..count as usize).map(Extra::Old));
     }
 
-    /// Sends frames that nobody knows.
+    /// Sends unknown frames.
     pub fn unknown(&mut self, count: u32) {
         let frame = Frame { id: UNKNOWN_ID, length: 8, data: [0x55; 8] };
         self.extra.extend((0..count).map(|_| Extra::Frame(frame)));
@@ -144,7 +144,7 @@ impl Sender {
         self.extra.extend((0..count).map(|_| Extra::OutOfRange));
     }
 
-    /// The frame of a slot. Fails with a value that its signal cannot carry.
+    /// The frame of a slot. Fails if a signal cannot carry its value.
     pub fn step(&mut self, slot: u64, command: &Spoken) -> Result<Option<Frame>, OutOfRange> {
         if slot < self.silent_until {
             return Ok(None);
@@ -177,7 +177,7 @@ impl Sender {
         })
     }
 
-    /// The frame that leaves instead of a command.
+    /// The frame that is sent instead of a command.
     fn mistreated(&mut self, frame: Frame) -> Option<Frame> {
         if self.kept.len() == KEPT {
             self.kept.pop_front();
@@ -185,7 +185,7 @@ impl Sender {
         self.kept.push_back(frame);
         if self.corrupt > 0 {
             self.corrupt -= 1;
-            // Another bit each time, CRC and counter included.
+            // A different bit each time, CRC and counter included.
             self.turned = (self.turned + 13) % 64;
             let data = (u64::from_le_bytes(frame.data) ^ 1 << self.turned).to_le_bytes();
             return Some(Frame { data, ..frame });

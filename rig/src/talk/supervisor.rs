@@ -1,4 +1,4 @@
-//! The vehicle's computer: does what the lines say, slot by slot.
+//! The vehicle's computer: executes the lines, slot by slot.
 
 use super::lines::Lines;
 use super::listener::Listener;
@@ -13,18 +13,18 @@ use std::fmt::Write as _;
 use tractive::machine::Ratings;
 use tractive::protocol::{Frame, ParameterRequest, Zs9Link};
 
-/// Slots for which a level stands whose edge counts: more than may be lost in a row.
+/// Slots for which an edge-triggered level is held: more than may be lost in a row.
 const EDGE_SLOTS: u64 = 5 * COMMAND_SLOTS;
 /// The time that passes after a typed line, so that its effect shows, in s.
 const TYPED_S: f64 = 0.1;
-/// Slots between two tellings of the state.
+/// Slots between two displays of the state.
 const SHOWN_SLOTS: u64 = 100;
 /// Length of a slot, in s.
 const SLOT_S: f64 = 1e-3;
-/// Half of it: what is due in a slot.
+/// Half a slot, in s: a line that is due within it belongs to the slot.
 const DUE_S: f64 = 0.5 * SLOT_S;
 
-/// Straight lines of both demands.
+/// Linear ramps of both demands.
 #[derive(Clone, Copy, Debug, Default)]
 struct Ramp {
     from: [f64; 2],
@@ -49,11 +49,11 @@ pub struct Talk {
     lines: Lines,
     next: Option<Line>,
     ended: bool,
-    /// Before this time no line is done.
+    /// Time before which no line is executed.
     wait_until_s: f64,
     slot: u64,
     command: Spoken,
-    /// Slots in which charge, discharge and acknowledge are taken back.
+    /// Slots from which on charge, discharge and acknowledge are withdrawn.
     edges: [u64; 3],
     ramp: Ramp,
     speed_loop: Option<SpeedLoop>,
@@ -71,16 +71,16 @@ pub struct Talk {
     pub sent: u64,
     /// Frames received.
     pub received: u64,
-    /// The line that tells the drive's state while a script runs.
+    /// The line that shows the drive's state while a script runs.
     shown: ProgressBar,
     /// Expectations so far.
     pub expectations: u32,
-    /// Those that were not met.
+    /// Expectations that were not met.
     pub failures: Vec<String>,
 }
 
 impl Talk {
-    /// At rest; the speed loop is made for this inertia and for the largest torque, the steps of all signals for the ratings.
+    /// A talk at rest: the speed loop is made for this inertia and for the largest torque, the steps of all signals for the ratings.
     pub fn new(system: System, lines: Lines, inertia_kg_m2: f64, ratings: &Ratings) -> Self {
         let scales = system.scales(ratings);
         Self {
@@ -109,14 +109,14 @@ impl Talk {
         }
     }
 
-    /// As candump logs: time, channel, identifier and bytes, T for what is sent to the drive, R for what it sends.
+    /// Logs a frame in candump's format: time, channel, identifier and bytes, T for frames to the drive, R for frames from it.
     fn log(&mut self, t_s: f64, frame: &Frame, direction: char) {
         let bytes = frame.data.iter().take(usize::from(frame.length));
         let bytes: String = bytes.map(|byte| format!("{byte:02X}")).collect();
         let _ = writeln!(self.frames, "({t_s:.6}) can0 {:03X}#{bytes} {direction}", frame.id);
     }
 
-    /// Does the lines that are due.
+    /// Executes the lines that are due.
     fn read(&mut self, t_s: f64) -> Result<()> {
         while !self.ended && t_s + DUE_S >= self.wait_until_s {
             if self.next.is_none() {
@@ -138,10 +138,10 @@ impl Talk {
         Ok(())
     }
 
-    /// Does what a line says, now.
+    /// Executes a line now.
     ///
     /// # Errors
-    /// Says what of it cannot be understood.
+    /// Names the part that cannot be understood.
     pub fn say(&mut self, t_s: f64, text: &str) -> Result<()> {
         if let Some(line) = script::line(text, 1, self.system)? {
             self.act(t_s, &line);
@@ -149,7 +149,7 @@ impl Talk {
         Ok(())
     }
 
-    /// The rows since the last time; what was logged is forgotten.
+    /// Takes the rows since the last call, and clears the log.
     pub fn take_rows(&mut self) -> Vec<Vec<String>> {
         self.frames.clear();
         std::mem::take(&mut self.rows)
@@ -216,12 +216,12 @@ impl Talk {
         }
     }
 
-    /// A level stands for a while.
+    /// Holds a level for a while.
     fn raise(&mut self, which: usize) {
         self.edges[which] = self.slot + EDGE_SLOTS;
     }
 
-    /// The first request after a silence only sets the drive's counter, so something is read before.
+    /// Puts a read first, since the first request after a silence only sets the drive's counter.
     fn ask(&mut self, request: ParameterRequest) {
         self.sender.requests.extend([ParameterRequest { write: None, ..request }, request]);
     }

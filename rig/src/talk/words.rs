@@ -1,4 +1,4 @@
-//! The command lines of what talks to a drive: each has the options of its system alone.
+//! The command lines of the verbs that talk to a drive: each has only its system's options.
 
 use super::system::System;
 use crate::options::RunOptions;
@@ -15,7 +15,7 @@ use std::ffi::OsString;
 pub struct DriveOptions {
     /// The system that is talked to.
     pub system: System,
-    /// The machine's and its load's inertia, in kg·m², where it was named.
+    /// The machine's and its load's inertia, in kg·m², if it was named.
     inertia: Option<f64>,
     /// The options that all runs share.
     pub run: RunOptions,
@@ -47,7 +47,7 @@ struct Shared {
     /// The system that is talked to.
     #[arg(long, value_enum, default_value_t)]
     system: System,
-    /// The machine's and its load's inertia, in kg·m²; default 10, of each of the ZS9's 0.1, for which its speed loops are made.
+    /// The machine's and its load's inertia, in kg·m²; default 10, for each of the ZS9's 0.1, for which its speed loops are made.
     #[arg(long, value_parser = crate::options::positive)]
     inertia: Option<f64>,
     /// The options that all runs share.
@@ -55,7 +55,7 @@ struct Shared {
     run: RunOptions,
 }
 
-/// The system that words name, or the usual one; a name that is none is left to the command line itself.
+/// The system that the words name, or the usual one; an invalid name is left to the command line itself.
 fn named(words: &[OsString]) -> System {
     let value = |k: usize, word: &OsString| match word.to_str()?.strip_prefix("--system")? {
         "" => words.get(k + 1)?.to_str().map(str::to_owned),
@@ -74,7 +74,7 @@ pub fn command<C: Args>(verb: &'static str, system: System) -> Command {
     }
 }
 
-/// Reads the words behind a verb. The error is clap's own where it says more than a line, or help that was asked for.
+/// Reads the words behind a verb. The error is clap's own if it says more than a line, or is help that was asked for.
 pub fn read<C: Args>(
     verb: &'static str,
     words: &[OsString],
@@ -99,7 +99,7 @@ pub fn read<C: Args>(
     Ok((C::from_arg_matches(&matches)?, DriveOptions { system, inertia, run, traction, zs9 }))
 }
 
-/// Options of which none is named.
+/// The options when none is named.
 pub fn usual<O: Args>() -> Result<O> {
     let command = O::augment_args(Command::new("usual").no_binary_name(true));
     Ok(O::from_arg_matches(&command.try_get_matches_from([""; 0])?)?)
