@@ -1,4 +1,4 @@
-//! `rig live`: the live page of a drive that is elsewhere, in QEMU, on the host, or on a CAN bus. The page shows; commands must be permitted
+//! `rig live`: the live page of a drive that is elsewhere, in QEMU, on the host, or on a CAN bus. The page displays; commands must be permitted
 //! by an option and switched on in the page.
 
 mod relay;

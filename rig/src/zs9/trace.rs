@@ -72,7 +72,7 @@ pub struct Row {
     pub source_j: f64,
     /// Speeds at the step's end, in r/min.
     pub kinetic_speed_rpm: [f64; 2],
-    /// Energy in losses, at the shafts and stored at the step's end, in J: equal to [`Row::source_j`] except for a constant.
+    /// Energy in losses, at the shafts and stored at the step's end, in J: [`Row::source_j`] should equal it except for a constant.
     pub explained_j: f64,
 }
 
