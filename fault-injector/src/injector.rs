@@ -2,9 +2,9 @@
 //! wanted place.
 //!
 //! The firmware and its interrupts are the ordinary ones. Once the timers are to start, the vector table is a copy in RAM whose entries lead through
-//! here, and the ports report what passes through them. The fault to be injected is given on the emulator's command line, `-append "KIND AT AMOUNT
-//! FILE"`; the outcome is written into the file, as records of five words. Instants here are real ones, of a counter that nothing else uses: the tasks'
-//! nominal instants fall behind with every interrupt that they miss.
+//! here, and the ports report what passes through them. The fault to be injected is given on the emulator's command line,
+//! `-append "KIND AT AMOUNT FILE"`; the outcome is written into the file, as records of five words. Instants here are real ones, of a counter that
+//! nothing else uses: the tasks' nominal instants fall behind with every interrupt that they miss.
 #![allow(unsafe_code)]
 
 use crate::file::{self, File};

@@ -17,9 +17,9 @@
 //! usage, bad input, something missing), with the reason on one line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called, [`board`] which boards there are,
-//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`], [`flash`], [`twin`], [`fuzz`] and [`mutants`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
-//! its instructions by [`thumb`]; [`graph`] says which function calls which, [`check`] refuses what an image must not hold, and [`cells`]
-//! looks at what the cells did under the interrupts, in the [`emulator`].
+//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`], [`flash`], [`twin`], [`fuzz`] and [`mutants`] the commands; [`guide`] runs those of the
+//! documentation. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`] says which function calls which, [`check`] refuses what an
+//! image must not hold, and [`cells`] looks at what the cells did under the interrupts, in the [`emulator`].
 
 #![forbid(unsafe_code)]
 

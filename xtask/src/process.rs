@@ -29,7 +29,7 @@ pub fn say(what: &str) {
     eprintln!("xtask: {what}");
 }
 
-/// Prints the findings; none is good.
+/// Prints the findings; having none is good.
 pub fn is_good(findings: &[String]) -> bool {
     findings.iter().for_each(|finding| println!("{finding}"));
     findings.is_empty()
