@@ -1,4 +1,5 @@
-//! The blocks, each in a function of its name (`sin_cos/idsp` in `sin_cos_idsp`). None is inlined: what stands between a block's first instruction and its return is what is counted.
+//! The blocks, each in a function of its name (`sin_cos/idsp` in `sin_cos_idsp`). None is inlined: the instructions from a block's first to its return
+//! are counted.
 
 use crate::{Block, Input, Output, exact};
 use fixed::types::I16F16;
@@ -7,7 +8,7 @@ use tractive::built_in::traction::BUILT_IN;
 use tractive::control::{flux_linkage, mtpa};
 use tractive::frames::{self, Abc, Angle, Dq, SinCos};
 
-/// Every block; of those with the same word before the stroke the first is ours.
+/// Every block; of those with the same word before the slash, the first is ours.
 pub const ALL: [Block; 20] = [
     Block { name: "call/nothing", run: call_nothing, exact: None },
     Block { name: "sin_cos/tractive", run: sin_cos_tractive, exact: Some(exact::sin_cos) },
@@ -31,7 +32,7 @@ pub const ALL: [Block; 20] = [
     Block { name: "duty_tick/tractive", run: duty_tick_tractive, exact: None },
 ];
 
-/// The work that every block has besides its own: the call's return, two values read and two written.
+/// The overhead of every block besides its own work: the call's return, two values read and two written.
 #[inline(never)]
 fn call_nothing(input: &Input, output: &mut Output) {
     *output = input.vector;
@@ -153,7 +154,7 @@ fn core_tick_tractive(input: &Input, output: &mut Output) {
     *output = [phases.a, phases.b];
 }
 
-/// The same on to three duties: within the circle of the largest voltage, the integral part held back by what that cuts off, the phases
+/// The same, continued to three duties: within the circle of the largest voltage, the integral part held back by what that limit cuts off, the phases
 /// centred by the zero sequence.
 #[inline(never)]
 fn duty_tick_tractive(input: &Input, output: &mut Output) {

@@ -1,8 +1,8 @@
-//! Building blocks of the drive, and the same from crates one could pick instead, on the same inputs. `cargo xtask timing`
-//! counts their instructions in the emulator and takes their errors from the host.
+//! Building blocks of the drive, and the same blocks from crates that one could use instead, on the same inputs. `cargo xtask timing` counts their
+//! instructions in the emulator and takes their errors from the host.
 //!
-//! Every block has one form, input and output by reference, so that what it costs to call is the same for all: the
-//! loads and stores are counted with it.
+//! Every block has one form, input and output by reference, so that the cost of a call is the same for all: its loads and stores are included in the
+//! count.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -35,7 +35,7 @@ pub type Output = [f32; 2];
 pub struct Block {
     /// Its work and its maker, as `sin_cos/tractive`.
     pub name: &'static str,
-    /// The function; stands out of line.
+    /// The function; never inlined.
     pub run: fn(&Input, &mut Output),
     /// The exact result, in double precision; nothing where the results are not comparable.
     pub exact: Option<fn(&Input) -> [f64; 2]>,

@@ -1,4 +1,4 @@
-//! On the board: every block on every input, for whoever counts. On the host: their errors.
+//! On the board: runs every block on every input, for a counter outside. On the host: prints their errors.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// A line `name,error` each; the error is the largest of the absolute ones, empty where there is nothing to compare.

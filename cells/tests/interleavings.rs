@@ -29,8 +29,8 @@ impl Words<2> for Message {
     }
 }
 
-// The writer is the thread that loom runs first. The other way round loom sees too few interleavings: it goes back only to an
-// object's last access, which is the writer's own load of its counter.
+// The writer is the thread that loom runs first. The other way round loom sees too few interleavings: it backtracks only to an object's last access,
+// which is the writer's own load of its counter.
 
 #[test]
 fn an_uplink_is_never_torn() {
@@ -46,7 +46,7 @@ fn an_uplink_is_never_torn() {
     });
 }
 
-/// The newest two records' words, of which both are the record's number.
+/// The newest two records' words; both words of a record are its number.
 fn newest_two(trail: &History<2>) -> Option<[[u32; 2]; 2]> {
     let place = trail.find(1, |_| true)?;
     trail.read(place, |records| records.map(|record| [record.word::<0>(), record.word::<1>()]))
@@ -85,7 +85,7 @@ fn a_downlink_gives_the_value_that_is_ready_while_the_next_one_is_written() {
     });
 }
 
-/// Of four slots the last three values stand while the next one is written, whichever of them the reader is to have.
+/// With four slots, the last three values stay whole while the next one is written, whichever of them the reader is to get.
 #[test]
 fn a_planned_value_is_whole_until_three_later_ones_are_published() {
     for wanted in 2..=4 {
@@ -100,7 +100,7 @@ fn a_planned_value_is_whole_until_three_later_ones_are_published() {
     }
 }
 
-/// The test can fail: the oldest slot is the one that is written.
+/// The test can fail: the oldest slot is the one being written.
 #[test]
 #[should_panic(expected = "assertion")]
 fn a_planned_value_of_four_slots_ago_is_written_over() {
@@ -145,7 +145,7 @@ fn a_downlink_outside_its_protocol_is_torn() {
     });
 }
 
-/// Nothing of the first value is seen before all of it.
+/// Nothing of the first value is seen before it is complete.
 #[test]
 fn the_first_value_of_an_uplink_is_whole_or_not_there() {
     loom::model(|| {
@@ -205,7 +205,7 @@ fn a_downlink_goes_forward() {
     });
 }
 
-/// Words behind one another, with nothing that says whether they belong together: what the cells are instead of.
+/// Words one after another, with nothing that says whether they belong together: the cells exist to avoid this.
 #[test]
 #[should_panic(expected = "torn")]
 fn words_alone_are_torn() {

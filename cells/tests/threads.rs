@@ -1,5 +1,5 @@
-//! The cells between two threads, which race where the interrupts of one core would only preempt each other. In `cargo xtask test
-//! --only miri` the interpreter looks on: undefined behaviour, data races, and the stale values that weak memory allows.
+//! The cells between two threads, which race where the interrupts of one core would only preempt each other. In `cargo xtask test --only miri` the
+//! interpreter checks for undefined behaviour, data races, and the stale values that weak memory allows.
 #![cfg(not(loom))]
 
 use std::sync::Barrier;
@@ -32,7 +32,7 @@ impl Words<9> for Message {
 
 const ROUNDS: u32 = if cfg!(miri) { 50 } else { 200_000 };
 
-/// The writer may overtake every try of a read: then there is nothing, but never anything torn or older than before.
+/// The writer may overtake every try of a read: then the reader gets nothing, but never anything torn or older than before.
 #[test]
 fn an_uplink_between_threads_is_whole_and_goes_forward() {
     let cell = Seqlock::<Message, 9>::new();
@@ -52,8 +52,8 @@ fn an_uplink_between_threads_is_whole_and_goes_forward() {
     assert_eq!(cell.read(), Some(Message::number(ROUNDS - 1)));
 }
 
-/// The protocol, with numbers for instants: while value n + 1 is written, value n is the one that is ready, and no second value
-/// is begun before the reads are over.
+/// The protocol, with numbers for instants: while value n + 1 is written, value n is the ready one, and no second value is begun before the reads are
+/// over.
 #[test]
 fn a_downlink_between_threads_has_what_is_ready() {
     let cell = Mailbox::<Message, 9>::new();

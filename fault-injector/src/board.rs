@@ -1,4 +1,4 @@
-//! QEMU's board with the injector around its interrupts and ports. What is not named here is the board's own.
+//! QEMU's board with the injector around its interrupts and ports. Anything not named here is the board's own.
 
 use crate::injector;
 use tractive::board::qemu;
@@ -16,25 +16,25 @@ use tractive::protection::SafeState;
 use tractive::time::Instant;
 use tractive::wire::{DualRequest, DualSetup, Request, Setup};
 
-/// As the board's; and the injector reads its orders.
+/// As the board's, and the injector reads its orders.
 pub fn connect() -> Setup {
     injector::connect();
     qemu::connect()
 }
 
-/// As the board's; and the injector reads its orders.
+/// As the board's, and the injector reads its orders.
 pub fn connect_dual() -> DualSetup {
     injector::connect();
     qemu::connect_dual()
 }
 
-/// As the board's; and the injector takes the interrupts over.
+/// As the board's, and the injector takes the interrupts over.
 pub fn start(first_half_ticks: u32, control_ticks: u32) {
     injector::start();
     qemu::start(first_half_ticks, control_ticks);
 }
 
-/// As the board's; and the injector takes the interrupts over.
+/// As the board's, and the injector takes the interrupts over.
 pub fn start_dual(settings: &Settings) {
     injector::start();
     qemu::start_dual(settings);

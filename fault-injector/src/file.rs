@@ -1,4 +1,4 @@
-//! A file of this machine's, and the emulator's command line.
+//! A file on the host machine, and the emulator's command line.
 
 use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 use cortex_m_semihosting::syscall;
@@ -7,7 +7,7 @@ use cortex_m_semihosting::syscall;
 pub struct File(AtomicU32);
 
 impl File {
-    /// One that swallows what is written.
+    /// A file that discards what is written.
     pub const fn closed() -> Self {
         Self(AtomicU32::new(u32::MAX))
     }

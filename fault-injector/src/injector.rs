@@ -1,10 +1,10 @@
-//! The fault injector: interrupts that are late, lost or slow, and control's that begin later, so that the PWM interrupt lands in them
-//! where it is wanted.
+//! The fault injector: interrupts that are late, lost or slow, and control interrupts that begin later, so that the PWM interrupt lands in them at the
+//! wanted place.
 //!
-//! The firmware and its interrupts are the ordinary ones. Once the timers are to start, the vector table is a copy in RAM whose entries
-//! lead through here; and the ports tell what goes through them. What is to be injected stands on the emulator's command line,
-//! `-append "KIND AT AMOUNT FILE"`; what came of it is written into the file, as records of five words. Instants here are real ones, of a
-//! counter that nobody else knows: the tasks' nominal ones fall behind with every interrupt that they miss.
+//! The firmware and its interrupts are the ordinary ones. Once the timers are to start, the vector table is a copy in RAM whose entries lead through
+//! here, and the ports report what passes through them. The fault to be injected is given on the emulator's command line,
+//! `-append "KIND AT AMOUNT FILE"`; the outcome is written into the file, as records of five words. Instants here are real ones, of a counter that
+//! nothing else uses: the tasks' nominal instants fall behind with every interrupt that they miss.
 #![allow(unsafe_code)]
 
 use crate::file::{self, File};
@@ -31,7 +31,7 @@ enum Kind {
     PwmLate,
     /// `amount` PWM ticks pass without their interrupt: the shadow registers are played once more.
     PwmLost,
-    /// Each control interrupt begins later by as many instructions as the file says that then takes what came of it.
+    /// Each control interrupt begins later by as many instructions as the file says; the same file then takes the outcome.
     Landing,
 }
 
@@ -57,14 +57,14 @@ static LOADED: AtomicU32 = AtomicU32::new(0);
 static SAFE: AtomicBool = AtomicBool::new(false);
 /// The ZS9's gates, as they have shown themselves since the PWM interrupt last asked, beyond what the rig will tell it.
 static LATCHED: AtomicU32 = AtomicU32::new(0);
-/// The word of a power sample that tells the gates.
+/// The word of a power sample that holds the gates' feedback.
 const GATES: usize = 8;
 /// First word of a record: that the gates were turned off, or a control interrupt.
 const GATES_OFF: u32 = 1;
 const CONTROL: u32 = 2;
 /// Number of the present control interrupt, from 0.
 static CALL: AtomicU32 = AtomicU32::new(0);
-/// For each control interrupt, by how many instructions later than it comes it begins.
+/// For each control interrupt, the number of instructions by which it begins later than it comes.
 static DELAYS: [AtomicU16; CALLS] = [const { AtomicU16::new(0) }; CALLS];
 /// Ticks before the next carrier boundary at which the present control interrupt came.
 static LEFT: AtomicU32 = AtomicU32::new(0);
@@ -83,7 +83,7 @@ const COUNTER: [usize; 2] = [0x4000_2024, 0x4000_2028];
 const FREE_RUNNING_32_BIT: u32 = 0b1000_0010;
 /// CMSDK timer 1, which ends a delay.
 const DELAY_TIMER: usize = 0x4000_1000;
-/// From the coming of a control interrupt on, in ticks: it has taken its samples then, and is far from its end.
+/// From the arrival of a control interrupt, in ticks: by then it has taken its samples, and is far from its end.
 const BEHIND_SAMPLES: u32 = 100;
 
 /// CMSDK timer 1's interrupt, which ends a delay.
@@ -184,7 +184,7 @@ fn is(kind: Kind) -> bool {
     KIND.load(Relaxed) == kind as u32
 }
 
-/// True of an interrupt that the fault is for, the first ones from its instant on.
+/// True for an interrupt that the fault affects: the first ones from its instant on.
 fn is_injected(kind: Kind, most: u32) -> bool {
     let (now, injected) = (now(), INJECTED.load(Relaxed));
     if !is(kind) || now < AT.load(Relaxed) || injected >= most {
@@ -241,7 +241,7 @@ unsafe extern "C" fn pwm_comes(frame: &[u32; 8]) -> bool {
     let (lost, late) = (is_injected(Kind::PwmLost, amount), is_injected(Kind::PwmLate, 1));
     let behind = INJECTED.load(Relaxed) > 0 && (is(Kind::PwmLost) || is(Kind::PwmLate));
     if behind {
-        // Otherwise the next half would take the place of the one that is played once more.
+        // Otherwise the next half would replace the one that is played once more.
         let mut block = Request::PwmSample(Instant(now())).to_block();
         exchange(&mut block, PWM_ANSWERS);
         latch(block.get(GATES).copied().unwrap_or(0));
@@ -266,7 +266,7 @@ fn delay(ticks: u32) {
     write_register(DELAY_TIMER, 0b1001);
 }
 
-/// The end of a delay: the PWM interrupt comes at last, or control is kept from going on.
+/// The end of a delay: the PWM interrupt comes at last, or control is held up.
 unsafe extern "C" fn delay_ends() {
     write_register(DELAY_TIMER, 0);
     write_register(DELAY_TIMER + 0xC, 1);
@@ -279,7 +279,7 @@ unsafe extern "C" fn delay_ends() {
     unsafe { NVIC::unmask(Interrupt::DUALTIMER) }
 }
 
-/// Notes the instruction of the control interrupt that comes next, if it is one.
+/// Notes the instruction of the control interrupt that would be executed next, if a control interrupt was hit.
 fn land(frame: &[u32; 8]) {
     let [.., address, status] = *frame;
     if status & 0x1FF == 16 + Interrupt::TIMER0 as u32 {
@@ -287,14 +287,14 @@ fn land(frame: &[u32; 8]) {
     }
 }
 
-/// Notes how far the next carrier boundary is, and waits for as many instructions as the present control interrupt is to be late by.
+/// Notes how far away the next carrier boundary is, and waits for the number of instructions by which the present control interrupt is to be late.
 fn wait_before_control(call: u32) {
     let delay = DELAYS.get(call as usize).map_or(0, |delay| delay.load(Relaxed));
     LEFT.store(read_register(PWM_VALUE), Relaxed);
     spend(delay.into());
 }
 
-/// Executes exactly so many instructions more than with 0. A loop that asks a timer would do so once in several instructions only.
+/// Executes exactly so many instructions more than with 0. A loop that polls a timer would have a resolution of several instructions only.
 #[inline(never)]
 fn spend(instructions: u32) {
     // SAFETY: the instructions read and write nothing but a register of their own and the flags.

@@ -1,6 +1,6 @@
-//! The inputs that are kept in `fuzz/corpus`: all that fuzzing reached, and all that it found.
+//! The inputs that are kept in `fuzz/corpus`: they reach all that fuzzing has reached, and include all that it found.
 
-/// Checks each input of a folder, which is named from the package's own.
+/// Checks each input of a folder, given relative to the package's own.
 pub fn each(folder: &str, check: impl Fn(&[u8])) {
     let entries = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{folder}: {error}"));
     let mut count = 0;

@@ -1,6 +1,6 @@
-//! Anything into both drives: any words for measurements and demands, interrupts in any order. No panic, no number that is none in a
-//! report, no gate state that is not legal, no pulses with a fault, no compare value out of its range, no half of a length that the timer
-//! cannot count, no link that is shorted longer than was asked for.
+//! Arbitrary inputs to both drives: any words as measurements and demands, interrupts in any order. No panic, no NaN or infinity in a report, no illegal gate
+//! state, no pulses with a fault, no compare value out of its range, no half of a length that the timer cannot count, no link shorted for longer than
+//! was asked for.
 
 use crate::bytes::Bytes;
 use tractive::built_in::{traction::BUILT_IN, zs9};
@@ -28,9 +28,9 @@ pub enum Call {
     Control(Option<(u8, u32)>),
     /// The PWM timer's.
     Pwm(Option<(u8, u32)>),
-    /// The revision that control asks for first thing in its interrupt, whether it wants it or not.
+    /// The revision that control requests at the beginning of its interrupt, whether it wants one or not.
     Revise,
-    /// The operator acknowledges, whatever there is; then as [`Call::Healthy`].
+    /// The operator acknowledges, whatever the state; then as [`Call::Healthy`].
     Acknowledge(u16),
     /// Both in their order, so many of them.
     Healthy(u16),
@@ -58,14 +58,14 @@ struct Board {
     periods: Option<(PlayedPeriod, f32)>,
     entered: bool,
     trip: Option<Trip>,
-    /// A number that is none in a report without a fault.
+    /// A NaN or infinity in a report without a fault.
     odd: Option<String>,
     /// The newest shoot-through duties that control gave: as many as its mailbox keeps.
     duties: [f32; 2],
 }
 
 impl Call {
-    /// The number of interrupts in their order.
+    /// The number of interrupts in the regular order.
     fn count(self) -> u16 {
         match self {
             Self::Healthy(count) | Self::Acknowledge(count) | Self::Spoilt(_, count) => count,
@@ -258,7 +258,7 @@ impl PwmPort<Dual> for Board {
             currents_a: [currents(self.omega, now.0, Dq { d: -5.0, q: 25.0 }); 2],
             capacitor_v: 533.5,
             source_v: 400.0,
-            // Each gate has been on and off, as far as anybody asks.
+            // Each gate is reported to have been on and off.
             gates: GateFeedback { on: 0x1FF, off: 0x1FF },
         };
         let Some((field, bits)) = self.spoilt else { return sample };
@@ -291,7 +291,7 @@ impl PwmPort<Dual> for Board {
 /// Shortest pulse of the two-level inverter's devices, in ticks; a carrier half may hold half of it.
 const MIN_PULSE_TICKS: u32 = 250;
 const DEAD_TIME_TICKS: u32 = 100;
-/// Longest half that a 16-bit timer of the board's clock could count is shorter; none may stop the drive for longer.
+/// The longest half that a 16-bit timer of the board's clock could count is shorter than this; none may stop the drive for longer.
 const LONGEST_HALF_TICKS: u32 = 100_000;
 
 fn check_half(board: &Board, trip: Option<Trip>, pwm_trip: Option<Trip>) {
@@ -302,7 +302,7 @@ fn check_half(board: &Board, trip: Option<Trip>, pwm_trip: Option<Trip>) {
     assert!(pwm_trip.is_none() || half.mode == Mode::Off, "pulses with {pwm_trip:?}");
     assert!(!board.entered || trip.is_some() || pwm_trip.is_some(), "safe state without a fault: {half:?}");
     for compare in half.compare_ticks {
-        // Against the dead time an edge is commanded earlier.
+        // Against the dead time, an edge is commanded earlier.
         let whole = (MIN_PULSE_TICKS / 2 - DEAD_TIME_TICKS..=period - MIN_PULSE_TICKS / 2).contains(&compare);
         assert!(whole || compare == 0 || compare >= period, "{half:?}");
     }
@@ -339,8 +339,7 @@ pub fn check_traction(omega: f32, first: u32, calls: &[Call]) {
     }
 }
 
-/// A carrier period of the ZS9 in steps of the compare units: no leg whose node has no potential, and the link shorted for no longer
-/// than asked for.
+/// A carrier period of the ZS9 in steps of the compare units: no leg whose node has no potential, and the link not shorted for longer than asked for.
 fn check_period(played: &PlayedPeriod, half: u32, duty: f32) {
     // Between two edges nothing changes.
     let mut edges: Vec<u32> = played.gates.iter().flat_map(|gate| [gate.off_from, gate.off_to]).collect();
@@ -448,5 +447,5 @@ fn spoilt(bytes: &mut Bytes) -> Option<(u8, u32)> {
     Some((kind & 15, bits))
 }
 
-/// Numbers that are likely to matter.
+/// Numbers that are likely to cause trouble.
 pub const ODD: [f32; 8] = [0.0, -0.0, 1e-38, 1e38, -1e38, f32::NAN, f32::INFINITY, f32::NEG_INFINITY];

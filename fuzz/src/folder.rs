@@ -1,4 +1,4 @@
-//! Anything as a machine folder: it is refused in one line that names its file, or it is a machine whose numbers make sense.
+//! Arbitrary machine folders: each is refused in one line that names its file, or it is a machine whose numbers make sense.
 
 use tractive_tablegen::MachineFolder;
 
@@ -6,7 +6,7 @@ use tractive_tablegen::MachineFolder;
 const MACHINE: &str = include_str!("../machine/machine.toml");
 const MAP: &str = include_str!("../machine/flux_map.csv");
 
-/// The first byte chooses the file that the others stand for: `m`, the map; any other, the machine.
+/// The first byte chooses the file that the others become: `m`, the map; any other, the machine.
 pub fn check(bytes: &[u8]) {
     let Some((which, bytes)) = bytes.split_first() else { return };
     let text = String::from_utf8_lossy(bytes);

@@ -1,5 +1,5 @@
-//! Targets of fuzzing, and what must hold in each: a module a target, whose `check` takes any bytes. The ordinary tests include the same
-//! modules, with inputs of their own and with every file of `corpus/`.
+//! Fuzzing targets, and what must hold in each: one module per target, whose `check` takes any bytes. The ordinary tests include the same modules, with
+//! inputs of their own and with every file of `corpus/`.
 
 pub mod bytes;
 pub mod corpus;

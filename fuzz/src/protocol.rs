@@ -1,4 +1,4 @@
-//! Anything on the bus: nothing panics, only valid frames take effect, the counters add up, a request follows the newest command alone and
+//! Arbitrary traffic on the bus: nothing panics, only valid frames take effect, the counters add up, a request follows the newest command alone and
 //! ages, and what the drive sends is a frame of its messages.
 
 use crate::bytes::Bytes;
@@ -15,7 +15,7 @@ use tractive::protocol::{
     TorqueLimits, Zs9Command, Zs9Demands, Zs9Link, Zs9Session, trip_number,
 };
 
-/// The injuries that a bus, or somebody on it, does to frames.
+/// The errors that a bus, or some node on it, causes in frames.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// Any bytes under any identifier.
@@ -36,7 +36,7 @@ pub enum Event {
     State(usize),
 }
 
-/// Events of any bytes, at most so many.
+/// Events from any bytes, at most so many.
 fn events(bytes: &mut Bytes, to_drive: &[&Message]) -> Vec<Event> {
     const MOST: usize = 200;
     let mut next = || {
@@ -150,7 +150,7 @@ fn scales(bytes: &mut Bytes) -> Option<Scales> {
     }))
 }
 
-/// Only intact frames take effect, as they are, and the counters add up.
+/// Only intact frames take effect, unchanged, and the counters add up.
 pub fn check_receiver(events: &[Event]) {
     let (mut bus, mut receiver) = (Bus::new(), Receiver::new());
     let mut received = 0;
@@ -169,7 +169,7 @@ pub fn check_receiver(events: &[Event]) {
         if let Ok(content) = verdict {
             let message = TO_DRIVE.into_iter().find(|message| message.id == frame.id).unwrap();
             assert!(message.is_intact(&frame) && frame.length == 8);
-            // What took effect is what the frame says, with nothing clamped on the way.
+            // What took effect is what the frame says; nothing was clamped on the way.
             let zero = Payload(u64::from_le_bytes(frame.data) & !0xFFF);
             let same = match content {
                 Content::Greeting => true,
@@ -203,7 +203,7 @@ fn status(state: usize) -> Status {
     }
 }
 
-/// A request never asks for more than the newest valid command did, and for nothing once that is old; each frame that is sent is one.
+/// A request never asks for more than the newest valid command did, and asks for nothing once that is old; whatever is sent is a valid frame.
 pub fn check_session(events: &[Event]) {
     let ratings = &traction::BUILT_IN.ratings;
     let (mut bus, mut session, mut judge) = (Bus::new(), Session::new(ratings), Receiver::new());
@@ -213,7 +213,7 @@ pub fn check_session(events: &[Event]) {
         state = if let Event::State(state) = event { *state } else { state };
         let frame = bus.frame(event);
         for slot in 0..ms {
-            // Both times may be written.
+            // Both times are parameters and may be written.
             let before = *session.parameters();
             judge.wait(1, before.command_zero_ms as u32);
             age_ms = age_ms.saturating_add(1);
@@ -276,7 +276,7 @@ pub fn check_zs9(events: &[Event]) {
     }
 }
 
-/// Any words are a frame or none, and a frame is received.
+/// Any words are a frame or no frame; a frame is received.
 pub fn check_words(words: [u32; 3]) {
     if let Some(frame) = Option::<Frame>::from_words(words) {
         assert_eq!(Option::<Frame>::from_words(Some(frame).to_words()), Some(frame));
@@ -284,7 +284,7 @@ pub fn check_words(words: [u32; 3]) {
     }
 }
 
-/// Any content of any message is decoded without a panic; what is decoded is encoded as it came.
+/// Any content of any message is decoded without a panic; what was decoded is encoded to the same bytes.
 pub fn check_content(payload: Payload, scales: Scales) {
     let (mut measured, mut counts) = (Measured::default(), Counts::default());
     for message in FROM_DRIVE {

@@ -1,9 +1,9 @@
-//! Any text as a talk's script: no panic, and a refusal names its line.
+//! Arbitrary text as a talk's script: no panic, and a refusal names its line.
 
 use crate::talk::System;
 use crate::talk::script::script;
 
-/// Any bytes, as far as they are text.
+/// Any bytes, with whatever is not text replaced.
 pub fn check(bytes: &[u8]) {
     check_text(&String::from_utf8_lossy(bytes));
 }

@@ -1,4 +1,4 @@
-//! The reader of scripts by itself: the rig as a whole would be minutes to build.
+//! The reader of scripts by itself: the rig as a whole would take minutes to build.
 
 #[path = "../../rig/src/talk/script.rs"]
 pub mod script;

@@ -1,4 +1,4 @@
-//! Any words over the wire between an emulated board and the rig, and out of the cells: no panic, and what is understood says the same
+//! Any words over the wire between an emulated board and the rig, and out of the cells: no panic, and whatever is understood is encoded to the same
 //! again.
 
 use crate::bytes::Bytes;
@@ -20,7 +20,7 @@ pub fn check(bytes: &[u8]) {
     check_cells(&block);
 }
 
-/// A request that is understood says the same again.
+/// A request that is understood is encoded to the same words again.
 pub fn check_request(block: &Block) {
     if let Some(request) = Request::from_block(block) {
         let said = request.to_block();
@@ -43,7 +43,7 @@ pub fn check_answer(block: &Block) {
     let _ = (wire::currents_from_block(block), wire::power_from_block(block));
 }
 
-/// Contents of a cell say the same again, whatever its words.
+/// The contents of a cell are encoded to the same again, whatever its words.
 pub fn check_cells(block: &Block) {
     says_the_same::<PlannedHalf, _>(block);
     says_the_same::<Timed<DriveCommand>, _>(block);

@@ -1,4 +1,4 @@
-//! A drive that is driven, whichever system it is.
+//! A running drive, whichever system it is.
 
 use anyhow::{Result, bail};
 use serde_json::Value;
@@ -28,7 +28,7 @@ pub trait Driven {
     fn time_s(&self) -> f64;
     /// Adds the rows and edges since the last time.
     fn take(&mut self, taken: &mut Taken);
-    /// The operator's and the drive's word.
+    /// The operator's and the drive's status.
     fn state(&self) -> Value;
     /// Names of the faults that can be injected.
     fn faults(&self) -> Vec<String>;
@@ -42,8 +42,8 @@ pub trait Driven {
     fn inject(&mut self, name: &str) -> Result<()>;
     /// Mends all that was injected.
     fn mend(&mut self);
-    /// The bound that the pulses set to the current of motor 0 or 1 at the present operating point; nothing where that is not steady. Where
-    /// the pulses repeat, lines of its spectrum, a frequency in Hz, a current in A, and so on; else the current in A, row by row.
+    /// The bound that the pulses set to the current of motor 0 or 1 at the present operating point; nothing if the point is not steady. If the pulses
+    /// repeat, lines of its spectrum: a frequency in Hz, a current in A, and so on; else the current in A, row by row.
     fn bound(&self, motor: usize) -> Vec<f64>;
 }
 

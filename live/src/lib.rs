@@ -1,7 +1,7 @@
 //! The live bench: the drives' own code on their plants, in a browser.
 //!
-//! [`Bench`] is what the page's worker holds; it speaks in numbers, names and JSON. All that is simulated is the rig's
-//! ([`tractive_rig::scenario::traction::Live`], [`tractive_rig::scenario::zs9::Live`]); nothing here is.
+//! [`Bench`] is the object that the page's worker holds; it speaks in numbers, names and JSON. All simulation is the rig's
+//! ([`tractive_rig::scenario::traction::Live`], [`tractive_rig::scenario::zs9::Live`]); none is done here.
 #![forbid(unsafe_code)]
 
 mod driven;
@@ -80,7 +80,7 @@ impl Bench {
         std::mem::take(&mut self.taken.edges)
     }
 
-    /// The operator's and the drive's word, as JSON.
+    /// The operator's and the drive's status, as JSON.
     pub fn state(&self) -> String {
         self.drive.state().to_string()
     }
@@ -110,8 +110,8 @@ impl Bench {
         self.drive.mend();
     }
 
-    /// The bound that the pulses set to the current of motor 0 or 1. Where they repeat, lines of its spectrum, a frequency in Hz, a current
-    /// in A, and so on; else, of the ZS9, the current in A, row by row.
+    /// The bound that the pulses set to the current of motor 0 or 1. If they repeat, lines of its spectrum: a frequency in Hz, a current in A, and so
+    /// on; else, for the ZS9, the current in A, row by row.
     pub fn bound(&self, motor: usize) -> Vec<f64> {
         self.drive.bound(motor)
     }

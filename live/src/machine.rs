@@ -5,7 +5,7 @@ use tractive::built_in::{traction, zs9};
 use tractive_rig::machine::Machine;
 use tractive_tablegen::MachineFolder;
 
-/// The machine of this name in `tables/`, with the tables that are built in where they are its own.
+/// The machine of this name in `tables/`, with the built-in tables if they belong to it.
 pub fn named(name: &str) -> Result<Machine> {
     macro_rules! folder {
         ($name:literal) => {

@@ -1,4 +1,4 @@
-//! The operator's and the drive's word, as JSON.
+//! The operator's and the drive's status, as JSON.
 
 use crate::driven::number;
 use serde_json::{Value, json};

@@ -35,14 +35,14 @@ pub const COLUMNS: [Column<Row>; 16] = [
 
 /// Time over which the bound's operating point is taken, in s.
 const LOOKED_AT_S: f64 = 0.1;
-/// By how much the speed may change in it, as a share, and the least frequency in Hz.
+/// The share by which the speed may change in that time, and the lowest frequency in Hz.
 const STEADY: (f64, f64) = (0.01, 2.0);
 /// The highest frequency of the bound's lines, in Hz, and the smallest current, in A.
 const LINES: (f64, f64) = (3_000.0, 0.05);
-/// The largest number of samples of a bound that is worth its time.
+/// The largest number of samples for which a bound is worth the computing time.
 const MOST_SAMPLES: usize = 20_000;
 
-/// It, with its last rows.
+/// The PMaSynRM drive, with its last rows.
 pub struct Traction {
     live: Live,
     machine: Machine,

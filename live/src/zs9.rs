@@ -53,17 +53,17 @@ fn scheme_code(row: &Row) -> u8 {
     if made { place as u8 + 1 } else { 0 }
 }
 
-/// Time in which edges are kept, in s: at so many gates more would only be drawn as a band.
+/// Time for which edges are kept, in s: with so many gates, more would only be drawn as a band.
 const EDGES_S: f64 = 0.1;
 
 /// Time over which the bound's operating point is taken, in s.
 const LOOKED_AT_S: f64 = 0.1;
-/// By how much a speed, and a torque's demand, may change in it, as a share of the largest, and the speed below which nothing is asked, in r/min.
+/// The change of a speed and of a torque demand allowed in that time, as a share of the largest, and the speed below which no bound is asked, in r/min.
 const STEADY: (f64, f64) = (0.005, 30.0);
 /// Rows of the bound's current: those of the page's spectrum.
 const BOUND_ROWS: usize = 4096;
 
-/// It, with its last rows.
+/// The ZS9, with its last rows.
 pub struct Zs9 {
     live: Live,
     machine: Machine,

@@ -1,4 +1,4 @@
-//! The areas whose tests are tested, and the bounds that are asked of them.
+//! The areas whose tests are tested, and the minimum shares that are required of them.
 
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,7 @@ pub const CRATES: [(&str, &str); 4] = [
 ];
 
 impl Area {
-    /// The area of a file; none: nobody's.
+    /// The area of a file; `None` if it belongs to no area.
     pub fn of(file: &str) -> Option<Self> {
         let place =
             |area: &Self| file.strip_prefix(area.folder()).is_some_and(|rest| rest.starts_with(['/', '.']));

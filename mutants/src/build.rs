@@ -1,4 +1,4 @@
-//! The build of all test programs with all mutants, but those that do not compile this way.
+//! The build of all test programs with all mutants, except those that do not compile this way.
 
 use crate::schema::Schema;
 use crate::tree::{Tree, put};
@@ -19,7 +19,7 @@ const PACKAGES: [&str; 6] = [
     "tractive-rig",
 ];
 
-/// The rig's package, and those of its tests that soon end.
+/// The rig's package, and those of its tests that finish soon.
 const RIG: &str = "tractive-rig";
 const RIG_TESTS: [&str; 12] = [
     "flying_start",
@@ -36,7 +36,7 @@ const RIG_TESTS: [&str; 12] = [
     "zs9_scenarios",
 ];
 
-/// The features of each package's tests, so that all compile the same code: the optimised patterns are nobody's default.
+/// The features of each package's tests, so that all compile the same code: no package has the optimised patterns as a default.
 const FEATURES: [(&str, &str); 4] = [
     ("tractive-control", "tractive-control/optimal"),
     ("tractive-tablegen", "tractive-tablegen/patterns"),
@@ -52,7 +52,7 @@ pub fn packages(named: &[String]) -> Vec<String> {
 /// The folder of the programs with all mutants.
 const TOGETHER: &str = "build";
 
-/// Builds until all is compiled, at most; every build leaves out what the last one complained of.
+/// The largest number of builds until everything compiles; every build leaves out what the last one complained of.
 const BUILDS: usize = 60;
 
 /// A program of tests, and the folder of its package; or the rig's own.
@@ -65,8 +65,7 @@ pub struct Program {
     pub is_test: bool,
 }
 
-/// Writes the sources and builds, in `tree` and `build` of a folder; the programs, and beside it the mutants left out with the error's
-/// code.
+/// Writes the sources and builds, in `tree` and `build` of a folder; returns the programs and the mutants that were left out, with the error's code.
 pub fn programs(
     work: &Path,
     tree: &Tree,
@@ -123,7 +122,7 @@ impl Messages {
     }
 }
 
-/// The rig in a command of its own: its features are not the others'.
+/// The rig is built by a command of its own, since its features differ from the others'.
 pub fn cargo_all(to: &Path, target: &Path, packages: &[String]) -> Result<Messages> {
     let (rig, others): (Vec<_>, Vec<_>) =
         packages.iter().map(String::as_str).partition(|package| *package == RIG);
@@ -140,7 +139,7 @@ pub fn cargo_all(to: &Path, target: &Path, packages: &[String]) -> Result<Messag
 }
 
 fn cargo(to: &Path, target: &Path, packages: &[&str], what: &[&str]) -> Result<Messages> {
-    // A plainer shell would drop the variables that have a program's name with a hyphen in theirs.
+    // A plainer shell would drop the variables that contain a program's name with a hyphen.
     let wrapper = to.join("mutant/rustc.sh");
     put(&wrapper, b"#!/usr/bin/env bash\nRUSTC_BOOTSTRAP=1 exec \"$@\"\n")?;
     Command::new("chmod").arg("+x").arg(&wrapper).status()?;
@@ -149,13 +148,13 @@ fn cargo(to: &Path, target: &Path, packages: &[&str], what: &[&str]) -> Result<M
     command.args(packages.iter().flat_map(|package| ["--package", package]));
     let features = FEATURES.iter().filter(|(package, _)| packages.contains(package));
     command.args(features.flat_map(|(_, feature)| ["--features", feature]));
-    // What is optimised less is compiled sooner; most of it runs only for a moment.
+    // Code that is optimised less is compiled sooner; most of it runs only for a moment.
     for package in ["tractive", "tractive-control", "tractive-tablegen", "tractive-nucleo-g474re"] {
         command.args(["--config", &format!("profile.release.package.{package}.opt-level=1")]);
     }
     command.env("CARGO_TARGET_DIR", target).env("RUSTC_WORKSPACE_WRAPPER", wrapper);
     if target.ends_with(TOGETHER) {
-        // In the repository's own folder, where other people's crates are compiled already.
+        // In the repository's own folder, where third-party crates are compiled already.
         command.envs(to.ancestors().nth(2).map(|folder| ("CARGO_BUILD_BUILD_DIR", folder)));
     }
     command.env("CARGO_PROFILE_RELEASE_INCREMENTAL", "true");
@@ -176,7 +175,7 @@ fn program(line: &Value) -> Option<Program> {
     Some(Program { path, folder, name: format!("{package} {}", line["target"]["name"].as_str()?), is_test })
 }
 
-/// Finds whose the error is: the smallest place that has its first byte in it.
+/// Finds the place that an error belongs to: the smallest one that contains the error's first byte.
 fn leave_out(
     to: &Path,
     line: &Value,

@@ -1,10 +1,10 @@
-//! Files that were changed of late: a sample looks there first.
+//! Files that were changed recently: a sample looks there first.
 
 use crate::tree::Mutant;
 use std::collections::HashSet;
 use std::process::Command;
 
-/// The files that the last commits changed, or that differ from the last one. None where there is no history: a sample is then of all.
+/// The files that the last commits changed, or that differ from the last one. None if there is no history: a sample is then drawn from all.
 pub fn files(commits: u32) -> HashSet<String> {
     let mut git = Command::new("git");
     git.current_dir(env!("CARGO_MANIFEST_DIR")).args(["diff", "--name-only", &format!("HEAD~{commits}")]);
@@ -42,7 +42,7 @@ mod tests {
         );
         let numbers: HashSet<u32> = chosen.iter().map(|mutant| mutant.number).collect();
         assert_eq!(numbers.len(), all.len());
-        // Whoever has few changes has a sample of all.
+        // Anyone with few changes gets a sample of everything.
         assert_eq!(
             first(all.iter().collect(), &HashSet::new(), 3).first().map(|of| of.number),
             all.first().map(|of| of.number)

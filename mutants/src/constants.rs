@@ -1,4 +1,4 @@
-//! Mutants in constants and lengths, and in what runs only while compiling: a build each, for no program could choose among them.
+//! Mutants in constants and lengths, and in code that runs only while compiling: a build each, since no program could choose among them.
 
 use crate::Places;
 use crate::areas::CRATES;

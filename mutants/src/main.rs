@@ -28,53 +28,52 @@ pub struct Options {
     /// Only the mutants of an area (may be repeated)
     #[arg(long, value_enum)]
     area: Vec<Area>,
-    /// Only those of files whose path begins so (may be repeated)
+    /// Only those of files whose path begins like this (may be repeated)
     #[arg(long)]
     file: Vec<String>,
-    /// Only those in constants and lengths, which take a build each
+    /// Only those in constants and lengths, each of which takes a build of its own
     #[arg(long, conflicts_with = "sample")]
     constants: bool,
     /// Shard K of N, from 0, into a file of its own
     #[arg(long, value_name = "K/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
-    /// So many of them, evenly spread
+    /// Only N of them, evenly spread
     #[arg(long, value_name = "N", conflicts_with = "shard")]
     sample: Option<usize>,
-    /// Draw the sample by this number instead
+    /// Draw the sample with this number as the seed instead
     #[arg(long, value_name = "N", requires = "sample")]
     seed: Option<u64>,
-    /// Half of the sample, where there are as many, from files that the last N commits or the working tree changed
+    /// Take half of the sample, if there are as many, from files that the last N commits or the working tree changed
     #[arg(long, value_name = "N", requires = "seed")]
     changed: Option<u32>,
-    /// Only the tests of these packages (may be repeated) [default: all that have any of this code]
+    /// Only the tests of these packages (may be repeated) [default: all that contain any of this code]
     #[arg(long, value_name = "NAME")]
     tests: Vec<String>,
-    /// Processor time of tests, without a mutant, that one mutant is tried with, in s
+    /// Processor time of tests, measured without a mutant, for which one mutant is tried, in s
     #[arg(long, value_name = "S", default_value_t = 20.0)]
     budget: f64,
-    /// Processor time that a test may take to be tried at all, in s
+    /// Longest processor time of a test that is still tried, in s
     #[arg(long, value_name = "S", default_value_t = 10)]
     longest: u64,
-    /// Try those that no test notices with runs of the rig too, and compare bytes
+    /// Try mutants that no test notices with runs of the rig too, and compare bytes
     #[arg(long)]
     bytes: bool,
     /// Threads
     #[arg(long, value_name = "N", default_value_t = 2)]
     jobs: usize,
-    /// Try those again that were missed, and are not known
+    /// Try those again that were missed and are not known
     #[arg(long)]
     again: bool,
-    /// Exit code 1 only where less than this share of what was tried is noticed by tests, or known, in percent [default: where a
-    /// survivor is not known]
+    /// Exit code 1 only if less than this share of what was tried is noticed by tests or known, in percent [default: if a survivor is not known]
     #[arg(long, value_name = "P")]
     least: Option<f64>,
-    /// Name the mutants, and do nothing
+    /// List the mutants and do nothing else
     #[arg(long)]
     list: bool,
-    /// Say what came of all that were tried, and do nothing; exit code 1 where one was not
+    /// Report the results of all that were tried and do nothing else; exit code 1 if one was not tried
     #[arg(long)]
     report: bool,
-    /// Make the results of the whole of all shards' files, and report
+    /// Merge all shards' files into the results of the whole, and report
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["shard", "sample", "area", "file", "constants"])]
     merge: Vec<PathBuf>,
 }
@@ -88,7 +87,7 @@ fn shard(text: &str) -> Result<(usize, usize), String> {
 pub struct Places {
     /// The repository.
     pub root: PathBuf,
-    /// The folder of the copy, its build, and what came of it.
+    /// The folder of the copy, its build, and the results.
     pub work: PathBuf,
 }
 

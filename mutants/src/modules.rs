@@ -25,7 +25,7 @@ pub fn files(root: &Path, file: &Path, out: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// Conditions that no test on the host meets, without their spaces; and what is of the tests themselves.
+/// Conditions that no test on the host meets, without their spaces; and those that mark the tests themselves.
 const OFF: [&str; 9] = [
     "(test)",
     "(all(test",

@@ -10,7 +10,7 @@ use anyhow::Result;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Errors that say that the mutant is no program: types that do not fit, a trait that is not there or not while compiling, a missing arm,
+/// Errors that say that the mutant is no valid program: types that do not fit, a trait that is missing or not available while compiling, a missing arm,
 /// an overflow that the compiler sees.
 const UNVIABLE: [&str; 11] = [
     "E0277",
@@ -47,7 +47,7 @@ fn counted(
             continue;
         }
         let Some(line) = results.of(mutant) else {
-            // A sample tries none of those that need a build each.
+            // A sample tries none of those that need a build of their own.
             let of = if (mutant.fixed || mutant.early) && options.sample.is_some() {
                 &mut count.elsewhere
             } else {
@@ -72,7 +72,7 @@ fn counted(
     Ok((counts, survivors))
 }
 
-/// Prints the table and writes a list of survivors for each area; `true` if all were tried, and all that survived are known.
+/// Prints the table and writes a list of survivors for each area; `true` if all were tried and all survivors are known.
 pub fn print(places: &Places, tree: &Tree, options: &Options) -> Result<bool> {
     let (counts, survivors) = counted(places, tree, options)?;
     println!(

@@ -17,18 +17,18 @@ pub enum Outcome {
     Killed,
     /// A test did not end.
     Late,
-    /// No test failed; a run of the rig wrote other bytes.
+    /// No test failed; a run of the rig wrote different bytes.
     Golden,
-    /// All that come by it, or what time there was, passed.
+    /// All tests that reach it, or as many as the time allowed, passed.
     Missed,
-    /// No test comes by it.
+    /// No test reaches it.
     Unreached,
     /// In a constant: it does not compile.
     NoProgram,
 }
 
 impl Outcome {
-    /// Nothing that more time could change.
+    /// `true` if more time could not change the result.
     pub fn is_settled(self) -> bool {
         matches!(self, Self::Killed | Self::Late | Self::NoProgram)
     }
@@ -41,7 +41,7 @@ pub struct Line {
     /// The hash of its file.
     pub source: u64,
     pub outcome: Outcome,
-    /// The test; of a mutant that was missed how many passed, of how many.
+    /// The test; for a mutant that was missed, how many passed, of how many.
     pub by: String,
 }
 
@@ -53,10 +53,10 @@ pub struct Results {
 }
 
 impl Results {
-    /// Opens it, and reads what is there. A shard's file begins with its head.
+    /// Opens it and reads its contents. A shard's file begins with its head.
     ///
     /// # Errors
-    /// A file that cannot be written; one of another head.
+    /// A file that cannot be written, or one with another head.
     pub fn open(path: &Path, head: Option<&Head>) -> Result<Self> {
         let text = std::fs::read_to_string(path).unwrap_or_default();
         let lines = text.lines().filter_map(|line| serde_json::from_str::<Line>(line).ok());
@@ -99,13 +99,13 @@ impl Results {
     }
 }
 
-/// Mutants that no test can notice, or none needs to, with the reason.
+/// Mutants that no test can notice, or that none needs to notice, with the reason.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Known {
     /// The reason of all of them.
     pub reason: String,
-    /// "FILE: WHAT in FUNCTION", and behind " @ " the line of the source where one function has the same mutation several times. Where a name still has
-    /// several mutants " #K" stands behind it for the K-th, from 1, or " (all N)" for all of so many.
+    /// "FILE: WHAT in FUNCTION", followed by " @ " and the line of the source if one function has the same mutation several times. If a name still has
+    /// several mutants, " #K" follows for the K-th, from 1, or " (all N)" for all of so many.
     pub mutants: Vec<String>,
 }
 
@@ -123,7 +123,7 @@ impl KnownList {
     /// Reads it.
     ///
     /// # Errors
-    /// A reason that is empty; a name of no mutant, of several, or of another number of them.
+    /// A reason that is empty; a name of no mutant, of several, or of a different number of mutants.
     pub fn read(path: &Path, mutants: &[Mutant]) -> Result<Self> {
         let text = std::fs::read_to_string(path).unwrap_or_default();
         Self::parse(&text, mutants).with_context(|| path.display().to_string())
@@ -187,7 +187,7 @@ pub struct Count {
     pub known: usize,
     /// Not tried yet.
     pub open: usize,
-    /// Left out of the build: of an error that says that no mutant of this kind can be, or of another.
+    /// Left out of the build: because of an error that says that no mutant of this kind can exist, or of another error.
     pub unviable: usize,
     pub elsewhere: usize,
 }
@@ -200,7 +200,7 @@ impl Count {
         [tests + self.known, self.of.values().sum()]
     }
 
-    /// The share of what was tried that was noticed by a test; and by a test or in bytes; in percent.
+    /// The share of what was tried that was noticed by a test, and the share noticed by a test or in bytes; in percent.
     pub fn shares(&self) -> (f64, f64) {
         let count =
             |outcomes: &[Outcome]| outcomes.iter().filter_map(|outcome| self.of.get(outcome)).sum::<usize>();

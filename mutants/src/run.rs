@@ -1,4 +1,4 @@
-//! The run: builds, learns which test comes by which mutant, and tries mutants with the tests that do, those first that cost least.
+//! The run: builds, learns which test reaches which mutant, and tries mutants with the tests that do, the cheapest first.
 
 use crate::build::{self, Program};
 use crate::changed;
@@ -77,7 +77,7 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     tree::copy(&places.root, &copy, tree)?;
     let mut left_out = left_out(places, tree);
     let packages = build::packages(&options.tests);
-    // A sample alone is sooner compiled.
+    // A sample alone compiles sooner.
     let numbers = |mutants: Vec<&Mutant>| mutants.iter().map(|mutant| mutant.number).collect();
     let only = numbers(match options.sample {
         Some(_) => chosen(&tree.mutants, options),
@@ -97,7 +97,7 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
             Some(outcome) => options.again && !outcome.is_settled() && !known.has(mutant),
         })
         .partition(|mutant| mutant.fixed);
-    // In no order: a run that is stopped is then a sample of all.
+    // In no particular order: a run that is stopped is then a sample of all.
     open.sort_by_cached_key(|mutant| drawn(0, mutant));
     let search = Search::new(&trials, options.budget, &places.work);
     let (done, alone) = (AtomicUsize::new(0), Mutex::new(fixed));
@@ -117,17 +117,17 @@ pub fn run(places: &Places, tree: &Tree, options: &Options) -> Result<()> {
     })?;
     let mut alone = alone.into_inner().unwrap_or_default();
     alone.sort_by_key(|mutant| mutant.number);
-    // A build each: none of a sample.
+    // A build each: a sample takes none of these.
     if options.sample.is_none() && !alone.is_empty() {
         constants::run(places, tree, &search, &packages, &alone, &results)?;
     }
     Ok(())
 }
 
-/// Limits up to which it is looked for what was learnt, in s.
+/// Limits up to which earlier results of learning are looked for, in s.
 const LONGEST_KEPT_S: u64 = 30;
 
-/// The trials of all programs; those of a program that is as it was are read.
+/// The trials of all programs; those of an unchanged program are read from file.
 fn learnt(places: &Places, programs: &[Program], options: &Options) -> Result<Vec<Trial>> {
     let longest_s = options.longest;
     let folder = places.work.join("reached");
@@ -142,7 +142,7 @@ fn learnt(places: &Places, programs: &[Program], options: &Options) -> Result<Ve
             (longest_s, include_str!("../goldens.txt")).hash(&mut hasher);
             folder.join(format!("{}-{:016x}.json", program.name.replace(' ', "-"), hasher.finish()))
         };
-        // What was learnt of longer ones, too, serves as well.
+        // What was learnt with longer limits serves as well.
         let read = |longest_s| std::fs::read_to_string(file(longest_s)).ok();
         let known = (longest_s..=LONGEST_KEPT_S).find_map(read);
         if let Some(trials) = known.and_then(|text| serde_json::from_str::<Vec<Trial>>(&text).ok()) {
@@ -170,9 +170,9 @@ fn learnt(places: &Places, programs: &[Program], options: &Options) -> Result<Ve
 /// The trials, and what is known of them.
 pub struct Search<'a> {
     trials: &'a [Trial],
-    /// For each mutant the trials that come by it.
+    /// For each mutant, the trials that reach it.
     by: HashMap<u32, Vec<usize>>,
-    /// Runs and kills of each trial in each file.
+    /// Runs and kills of each trial, for each file.
     scores: Mutex<HashMap<(String, usize), (f64, f64)>>,
     budget: f64,
     work: &'a Path,
@@ -189,7 +189,7 @@ impl<'a> Search<'a> {
         Self { trials, by, scores: Mutex::default(), budget, work }
     }
 
-    /// The trials that come by any of a file's mutants; all of them, where none does.
+    /// The trials that reach any of a file's mutants; all of them, if none does.
     pub fn of_file(&self, mutants: &[Mutant], file: &str) -> Vec<usize> {
         let own = mutants.iter().filter(|mutant| mutant.file == file);
         let found: BTreeSet<usize> =
@@ -202,7 +202,7 @@ impl<'a> Search<'a> {
         self.trials.get(index)
     }
 
-    /// Trials in the order in which a kill of a mutant is expected to cost least; tests before the rig's bytes.
+    /// Trials in the order of the expected cost of killing a mutant, lowest first; tests before the rig's bytes.
     fn ordered(&self, mutant: &Mutant, mut order: Vec<usize>) -> Vec<usize> {
         let scores = self.scores.lock();
         let cost = |index: &usize| {
@@ -222,7 +222,7 @@ impl<'a> Search<'a> {
         self.tried(mutant, by, |trial| trial.run(mutant.number, &self.work.join("scratch")))
     }
 
-    /// Runs trials, until one notices or the budget is spent.
+    /// Runs trials until one notices or the budget is spent.
     pub fn tried(
         &self,
         mutant: &Mutant,

@@ -1,9 +1,9 @@
-//! The source of a file with all its mutants in it, each behind its number.
+//! The source of a file with all its mutants in it, each guarded by its number.
 
 use crate::sites::{Bytes, Shape, Site};
 use std::ops::Range;
 
-/// A place in the source that is made: the mutant whose it is, or of `None` all of a site's.
+/// A place in the generated source: of which mutant it is, or with `None` of all mutants of a site.
 #[derive(Clone, Debug)]
 pub struct Written {
     pub bytes: Range<usize>,
@@ -14,11 +14,11 @@ pub struct Written {
 #[derive(Debug, Default)]
 pub struct Schema {
     pub text: String,
-    /// Mutants' own bytes, and behind them those of whole sites, outer ones first.
+    /// The mutants' own bytes, followed by those of whole sites, outer ones first.
     pub written: Vec<Written>,
 }
 
-/// A piece of what is put in: text, of a mutant or of none.
+/// A piece of inserted text, of a mutant or of none.
 type Piece = (String, Option<u32>);
 
 /// Text put in at a byte, and the byte to go on from.
@@ -31,7 +31,7 @@ struct Edit {
     pieces: Vec<Piece>,
 }
 
-/// Makes it. `numbers` has those of each site's mutants; 0: left out.
+/// Makes it. `numbers` holds those of each site's mutants; 0: left out.
 pub fn of(source: &str, sites: &[Site], numbers: &[Vec<u32>]) -> Schema {
     let mut edits = Vec::new();
     for (index, (site, numbers)) in sites.iter().zip(numbers).enumerate() {
@@ -70,7 +70,7 @@ pub fn of(source: &str, sites: &[Site], numbers: &[Vec<u32>]) -> Schema {
     schema
 }
 
-/// Bytes of one mutant of a site, and the text in their place, where it is compiled alone.
+/// The bytes of one mutant of a site, and the text that replaces them, if it is compiled alone.
 pub fn alone(source: &str, site: &Site, index: usize) -> Option<(Bytes, String)> {
     let signed = |right: usize, other: &str| (site.left..right, format!(" {other} "));
     Some(match &site.shape {
@@ -90,7 +90,7 @@ pub fn alone(source: &str, site: &Site, index: usize) -> Option<(Bytes, String)>
     })
 }
 
-/// Ways to put text in for one site.
+/// Ways to insert text for one site.
 struct Editor<'a> {
     site: usize,
     bytes: Bytes,
@@ -108,7 +108,7 @@ impl Editor<'_> {
         self.put(bytes.start, on, order, vec![plain(text)]);
     }
 
-    /// In the place of what stands between two operands.
+    /// Replaces the text between two operands.
     fn middle(&mut self, at: usize, on: usize, pieces: Vec<Piece>) {
         self.put(at, on, (1, 0, self.site as isize), pieces);
     }
@@ -126,7 +126,7 @@ fn is(number: u32) -> String {
     if number == 0 { "false".to_owned() } else { format!("::mutant::is({number})") }
 }
 
-/// One branch for each mutant that there is, then the code's own.
+/// One branch for each mutant that exists, then the code's own.
 fn branches<'a>(numbers: &[u32], texts: impl Iterator<Item = String> + 'a, own: &str) -> Vec<Piece> {
     let there = numbers.iter().zip(texts).filter(|(number, _)| **number > 0);
     let mut pieces: Vec<_> = there
@@ -197,7 +197,7 @@ fn bound(editor: &mut Editor, on: usize, name: &str, branches: Vec<Piece>) {
     editor.end(&bytes, [vec![begin], branches, vec![plain(" })")]].concat());
 }
 
-/// Each field by its mutant from the base, which is `__s`.
+/// Takes each mutated field from the base, which is `__s`.
 fn structure(editor: &mut Editor, base: &Bytes, fields: &[(String, bool, Bytes)], numbers: &[u32]) {
     for ((name, short, value), number) in fields.iter().zip(numbers).filter(|(_, number)| **number > 0) {
         let name_of = if *short { format!("{name}: ") } else { String::new() };

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-/// A run, by all that decides on its results.
+/// A run, described by all that determines its results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     area: Vec<Area>,
@@ -36,7 +36,7 @@ pub struct Head {
 }
 
 impl Head {
-    /// That of a shard of this run, whose mutants without a program are known; `None` of a run in one piece.
+    /// The head of a shard of this run, whose mutants without a program are known; `None` for a run in one piece.
     pub fn new(places: &Places, tree: &Tree, options: &Options) -> Option<Self> {
         let (shard, shards) = options.shard?;
         let left_out = run::named(tree, &left_out(places, tree));
@@ -58,7 +58,7 @@ pub fn file(places: &Places, options: &Options) -> PathBuf {
     places.work.join(name)
 }
 
-/// A shard's file as it is there.
+/// A shard's file as it exists.
 struct Shard {
     path: String,
     head: Head,
@@ -83,7 +83,7 @@ impl Shard {
 /// Merges shards' files into the results of the whole, in the order of the mutants, and the options into those of their run.
 ///
 /// # Errors
-/// A shard that is missing or there twice, of another run or of other sources; a mutant that was not tried, or in two shards.
+/// A shard that is missing or exists twice, is of another run or of other sources; a mutant that was not tried, or is in two shards.
 pub fn merge(paths: &[PathBuf], places: &Places, tree: &Tree, options: &mut Options) -> Result<()> {
     let mut shards = paths.iter().map(|path| Shard::read(path)).collect::<Result<Vec<_>>>()?;
     shards.sort_by_key(|shard| shard.head.shard);
@@ -146,7 +146,7 @@ mod tests {
             Options::parse_from(["mutants"].into_iter().chain(words.split_whitespace()))
         }
 
-        /// Runs a shard, of which so many mutants at the end are not tried.
+        /// Runs a shard, leaving so many mutants at the end untried.
         fn shard(&self, shard: &str, more: &str, left: usize) -> PathBuf {
             let options = self.options(&format!("--shard {shard} {more}"));
             let head = Head::new(&self.places, &self.tree, &options);
@@ -195,7 +195,7 @@ mod tests {
         assert!(run.merge(&of(&[0, 1, 2])).unwrap_err().ends_with("was not tried"));
     }
 
-    /// A shard that was cut off in the middle of a line goes on, and does not with other options.
+    /// A shard that was cut off in the middle of a line continues, but not with other options.
     #[test]
     fn a_shard_goes_on_where_it_was_cut_off() {
         let run = Run::new();

@@ -20,16 +20,16 @@ pub struct Found {
     pub function: String,
     /// "replace + with -", as cargo-mutants says it.
     pub what: String,
-    /// In a `const fn`: where it runs only while compiling, no test comes by it.
+    /// In a `const fn`: if it runs only while compiling, no test reaches it.
     pub early: bool,
 }
 
-/// The shape of a place, for what is written there.
+/// The shape of a place, which determines what is written there.
 #[derive(Clone, Debug)]
 pub enum Shape {
     /// A body after its brace: the values returned.
     Body(Vec<String>),
-    /// Two operands and what stands between them; other operators.
+    /// Two operands and the text between them; other operators.
     Operator { right: usize, own: String, others: Vec<&'static str> },
     /// `&&` or `||`.
     Lazy { right: usize, and: bool },
@@ -45,7 +45,7 @@ pub enum Shape {
     Fields { base: Bytes, fields: Vec<(String, bool, Bytes)> },
 }
 
-/// A place: its bytes, its left operand's end where it has one, its shape, and its mutants; `fixed` where it is compiled before one could be
+/// A place: its bytes, the end of its left operand if it has one, its shape, and its mutants; `fixed` if it is compiled before a mutant could be
 /// chosen: in a constant, a type, a length.
 #[derive(Clone, Debug)]
 pub struct Site {
@@ -56,7 +56,7 @@ pub struct Site {
     pub mutants: Vec<Found>,
 }
 
-/// All sites of a file, outer ones before those in them.
+/// All sites of a file, outer ones before the ones inside them.
 pub fn of(source: &str) -> syn::Result<Vec<Site>> {
     let file = syn::parse_file(source)?;
     let mut finder = Finder::default();
@@ -284,7 +284,7 @@ impl<'ast> Visit<'ast> for Finder {
         self.constant(|finder| structure.rest.iter().for_each(|base| finder.visit_expr(base)));
     }
 
-    /// The place of an assignment is written for each mutant, as it is.
+    /// The place of an assignment is written for each mutant, unchanged.
     fn visit_expr_binary(&mut self, binary: &'ast syn::ExprBinary) {
         self.binary(binary);
         self.fixed += usize::from(assigns(&binary.op));

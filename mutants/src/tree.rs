@@ -22,9 +22,9 @@ pub struct Mutant {
     pub source: String,
     /// Compiled before it can be chosen.
     pub fixed: bool,
-    /// In a `const fn`: where it runs only while compiling, no test comes by it.
+    /// In a `const fn`: if it runs only while compiling, no test reaches it.
     pub early: bool,
-    /// In a build of its own, what it puts in the place of which bytes of its file; of those two alone.
+    /// For a build of its own, the bytes of its file that it replaces, and the new text; only for the two kinds above.
     pub alone: Option<(Bytes, String)>,
     /// The hash of the file.
     pub hash: u64,
@@ -130,7 +130,7 @@ impl Source {
     }
 }
 
-/// Copies what git knows, but the sources with mutants; and the crate that says which one is in force.
+/// Copies what git knows, except the sources with mutants; adds the crate that says which one is active.
 pub fn copy(root: &Path, to: &Path, tree: &Tree) -> Result<()> {
     let mut git = Command::new("git");
     git.args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]).current_dir(root);
@@ -164,7 +164,7 @@ pub fn copy(root: &Path, to: &Path, tree: &Tree) -> Result<()> {
     put(&to.join("mutant/count.rs"), (tree.mutants.len() + 1).to_string().as_bytes())
 }
 
-/// Writes a file unless it is there as it is, so that cargo does not build it anew.
+/// Writes a file unless it exists unchanged, so that cargo does not rebuild it.
 pub fn put(path: &PathBuf, bytes: &[u8]) -> Result<()> {
     if std::fs::read(path).is_ok_and(|there| there == bytes) {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Runs of tests, with none of the mutants, with all of them watched, or with one in force.
+//! Runs of tests, with none of the mutants, with all of them watched, or with one active.
 
 use crate::build::Program;
 use anyhow::{Context, Result};
@@ -9,17 +9,17 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// A test that passes without a mutant; or a run of the rig whose files are compared with those of a run without one.
+/// A test that passes without a mutant, or a run of the rig whose files are compared with those of a run without one.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Trial {
     pub program: Program,
     /// The test's name, or the rig's words.
     pub name: String,
-    /// Of a run of the rig, the hash of its files.
+    /// For a run of the rig, the hash of its files.
     pub golden: Option<u64>,
     /// Processor time without a mutant, in s.
     pub seconds: f64,
-    /// The numbers of the mutants that it comes by.
+    /// The numbers of the mutants that it reaches.
     pub reached: Vec<u32>,
 }
 
@@ -31,10 +31,10 @@ pub enum End {
     Late,
 }
 
-/// A mutant's run may take so many times as long, and `GRACE_S` more.
+/// A mutant's run may take this many times as long, and `GRACE_S` more.
 const TIMES: f64 = 4.0;
 const GRACE_S: f64 = 0.9;
-/// A watched run takes longer than another: from so many s on a test's time is that of a run that is not watched.
+/// A watched run takes longer than another: from this many s on, a test's time is taken from a run that is not watched.
 const SHORT_S: f64 = 0.3;
 /// Time by the wall clock after which a run is ended, whatever it waits for.
 const WALL: Duration = Duration::from_secs(300);
@@ -48,7 +48,7 @@ impl Trial {
         }
     }
 
-    /// Draws at random are the same each time: else a test's time, and whether it notices a mutant, were chance.
+    /// Random draws are the same each time: otherwise a test's time, and whether it notices a mutant, would be chance.
     fn command(&self, out: &Path) -> Command {
         let mut command = Command::new(&self.program.path);
         command.env("PROPTEST_RNG_SEED", "1");
@@ -64,8 +64,8 @@ impl Trial {
         command
     }
 
-    /// Runs it watched, and what is compared or takes long once more; `None` where it fails, takes longer than `longest_s`, is never the same, or
-    /// comes by no mutant.
+    /// Runs it watched; a run that is compared or takes long is made once more. `None` if it fails, takes longer than `longest_s`, is never the same,
+    /// or reaches no mutant.
     pub fn learn(mut self, scratch: &Path, longest_s: u64) -> Option<Self> {
         let folder = tempfolder(scratch).ok()?;
         let (out, time, reached) = (folder.join("out"), folder.join("time"), folder.join("reached"));
@@ -92,7 +92,7 @@ impl Trial {
         (same && !self.reached.is_empty()).then_some(self)
     }
 
-    /// Runs it of another build, with a mutant that is compiled in.
+    /// Runs it from another build, with a mutant that is compiled in.
     pub fn run_in(&self, program: &Program, scratch: &Path) -> Result<End> {
         Self { program: program.clone(), ..self.clone() }.run(0, scratch)
     }
@@ -143,7 +143,7 @@ fn trial(program: &Program, name: String, golden: Option<u64>) -> Trial {
     Trial { program: program.clone(), name, golden, seconds: 0.0, reached: Vec::new() }
 }
 
-/// A folder of nobody else's.
+/// A folder that nothing else uses.
 fn tempfolder(scratch: &Path) -> Result<PathBuf> {
     use std::sync::atomic::{AtomicU64, Ordering};
     static NEXT: AtomicU64 = AtomicU64::new(0);
@@ -152,7 +152,7 @@ fn tempfolder(scratch: &Path) -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Processor time in a copy of the system's own count, of a process and of those that it waited for, in s.
+/// Processor time from a copy of the system's own count, for a process and those that it waited for, in s.
 fn processor_s(stat: &Path) -> f64 {
     let stat = std::fs::read_to_string(stat).unwrap_or_default();
     let fields = stat.rsplit_once(") ").map_or("", |(_, fields)| fields).split(' ');
@@ -178,13 +178,13 @@ fn ended(command: &mut Command) -> Option<ExitStatus> {
     }
 }
 
-/// Ended by the limit of its processor time.
+/// `true` if it was ended by its limit of processor time.
 fn is_late(status: ExitStatus) -> bool {
     use std::os::unix::process::ExitStatusExt;
     matches!(status.signal(), Some(24 | 9))
 }
 
-/// The hash of what a run wrote, and how it ended.
+/// The hash of the files that a run wrote, and how it ended.
 fn hash(out: &Path, status: ExitStatus) -> u64 {
     let mut hasher = DefaultHasher::new();
     status.code().hash(&mut hasher);
@@ -194,7 +194,7 @@ fn hash(out: &Path, status: ExitStatus) -> u64 {
     hasher.finish()
 }
 
-/// The mutants that any process of a run came by.
+/// The mutants that any process of a run reached.
 fn union(folder: &Path) -> Vec<u32> {
     let mut all: Vec<u8> = Vec::new();
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {

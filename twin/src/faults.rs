@@ -1,5 +1,5 @@
-//! The hardware's faults, each while the drive starts, rests, is charged, is enabled or pulls: the time until every gate is off, and what the
-//! drive says of it.
+//! The hardware's faults, each while the drive starts, rests, is charged, is enabled or makes torque: the time until every gate is off, and what the
+//! drive reports of it.
 
 use crate::chip::rcc::POWER_ON;
 use crate::core::cpu::{Cpu, Longest};
@@ -33,7 +33,7 @@ const FRAMES: usize = 8;
 /// The babbling node's frame: 47 bits with the space behind it.
 const EMPTY: Frame = Frame { id: 0x102, length: 0, data: [0; 8] };
 const EMPTY_TIME: Time = 47 * 2 * MICROSECOND;
-/// The time for which it is looked at afterwards, and where the fault comes in the start.
+/// The time for which the drive is observed afterwards, and where the fault comes in the start.
 const AFTER: Time = 300 * MILLISECOND;
 const AFTER_STARTING: Time = 90 * MILLISECOND;
 
@@ -117,7 +117,7 @@ impl Cause {
 /// The outcome.
 #[derive(Clone, Debug)]
 pub struct Seen {
-    /// The time from the cause until the last gate went off, and none went on again; `None` if one is on at the end.
+    /// The time from the cause until the last gate went off for good; `None` if one is on at the end.
     pub off_after: Option<Time>,
     /// The same of contactors, discharge resistor and chopper.
     pub lines_off_after: Option<Time>,
@@ -125,7 +125,7 @@ pub struct Seen {
     pub state: String,
     /// Gates were on just before.
     pub pulsed: bool,
-    /// The timers had their clocks just before; without them pins float as from the reset on, and what switches off does nothing.
+    /// The timers had their clocks just before; without them the pins float as from the reset on, and switching off does nothing.
     pub clocked: bool,
     /// Frames heard in the last third of the time.
     pub heard: u64,
@@ -133,7 +133,7 @@ pub struct Seen {
     pub resets: u32,
     /// State and fault as told at the end.
     pub told: String,
-    /// `true` if commands are listened to at the end, as told.
+    /// `true` if the drive listens to commands at the end, as told.
     pub listening: String,
     /// The last frames of the drive, as logged.
     pub frames: Vec<String>,
@@ -141,12 +141,12 @@ pub struct Seen {
     pub longest: BTreeMap<usize, Longest>,
     /// Frames that found the receive FIFO full.
     pub lost: u32,
-    /// The findings besides.
+    /// The other findings.
     pub findings: Vec<String>,
 }
 
-/// The instants of an undisturbed start at which a register is accessed for the first time, and those half-way between them, which lie in its
-/// waits. Accesses that are not [`APART`] are one. The error is that of an image that does not run.
+/// The instants of an undisturbed start at which a register is accessed for the first time, and the instants half-way between them, which lie in its
+/// waits. Accesses that are not [`APART`] count as one. An image that does not run is the error.
 pub fn starting(image: &Path, system: System) -> Result<Vec<Time>> {
     let mut cpu = drive(image, system)?;
     cpu.machine_mut().record = Some(Vec::new());
@@ -167,7 +167,7 @@ pub fn starting(image: &Path, system: System) -> Result<Vec<Time>> {
     Ok(instants)
 }
 
-/// Drives the image into a state, lets the fault come, and looks.
+/// Drives the image into a state, injects the fault, and observes what follows.
 pub fn look(image: &Path, system: System, cause: Cause, when: When) -> Result<Seen> {
     let mut cpu = drive(image, system)?;
     cpu.machine_mut().world.side.charge();
@@ -225,7 +225,7 @@ fn last_frames(log: &str) -> Vec<String> {
 fn disturb(cpu: &mut Cpu, system: System, cause: Cause, until: Time) -> Result<()> {
     let machine = cpu.machine_mut();
     machine.may_bite = true;
-    // A drive that begins anew counts its frames anew: whoever listens from now on hears it.
+    // A drive that restarts counts its frames anew: a listener that starts now follows it.
     machine.world.talk.listener = Listener::new(system, Scales::USUAL);
     match cause {
         Cause::Drivers => machine.world.ready = false,

@@ -14,7 +14,7 @@ pub struct Finding {
     pub address: Option<u32>,
     /// In words.
     pub text: String,
-    /// The times that it came, this one included.
+    /// The number of times that it occurred, this one included.
     pub count: u64,
 }
 
@@ -30,7 +30,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// The findings of a run, each text once a place.
+/// The findings of a run, each text once per place.
 #[derive(Debug, Default)]
 pub struct Findings {
     /// All of them, in their order.
@@ -51,7 +51,7 @@ impl Findings {
         }
     }
 
-    /// One more where something does not hold.
+    /// One more if a condition does not hold.
     pub fn expect(&mut self, holds: bool, text: impl FnOnce() -> String) {
         if !holds {
             self.add(text());

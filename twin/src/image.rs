@@ -19,7 +19,7 @@ pub struct Image {
     functions: Vec<(u32, String)>,
     /// Variables, likewise.
     variables: Vec<(u32, String)>,
-    /// The end of what has a place of its own in RAM: the stack may not come down to it.
+    /// The end of the static data in RAM: the stack may not come down to it.
     pub statics_end: u32,
     /// The bytes of the flash memory that it fills.
     pub flash_bytes: u32,

@@ -40,7 +40,7 @@ pub enum What {
 /// Cycles that reading from the flash memory would add, since the beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Waits {
-    /// With the prefetch alone, less what branches that were not taken have not taken.
+    /// With the prefetch alone, less the cycles that branches that were not taken have saved.
     pub prefetched: i64,
     /// Without any cache or prefetch.
     pub all: u64,
@@ -56,11 +56,11 @@ pub struct Machine {
     pub world: World,
     /// The findings.
     pub findings: Findings,
-    /// A reset by the watchdog is what is wanted.
+    /// A reset by the watchdog is intended.
     pub may_bite: bool,
     /// The resets so far, without the first.
     pub resets: u32,
-    /// The mistake that a run is made with: what becomes of a write on its way.
+    /// The mistake that a run is made with: the change that it makes to a write on its way.
     pub mistake: Option<fn(u32, u32) -> u32>,
     /// Every access to a peripheral, and every entry into an exception, if they are kept.
     pub record: Option<Vec<Access>>,
@@ -222,7 +222,7 @@ impl Machine {
         let Self { chip, world, findings, nvic, now, settled, .. } = self;
         self.masked = false;
         loop {
-            // Never back: what a changed clock lets be overdue comes now.
+            // Time never goes back: whatever a changed clock has made overdue happens now.
             let due = chip.next_event().min(world.next_event()).min(*now).max(*settled);
             *settled = due;
             if !nvic.has_fpu() && chip.is_pulsing() {
@@ -276,7 +276,7 @@ impl Machine {
             return;
         }
         self.keep(What::Write(address, value));
-        // All that happens before it, then the write, then all that it brings about.
+        // First all that happens before it, then the write, then all its effects.
         self.settle();
         self.findings.access = Some(address);
         self.chip.write(address, size, value, self.now, &mut self.findings);

@@ -33,7 +33,7 @@ struct Arguments {
     /// The drivers' ready wire drops at this time for 10 ms, in s.
     #[arg(long, value_name = "SECONDS")]
     drivers_fail: Option<f64>,
-    /// Holds the gates' edges against those that the drive makes on the host of the same inputs.
+    /// Compares the gates' edges with those that the drive makes on the host from the same inputs.
     #[arg(long)]
     host: bool,
     /// Counts the waits for the flash memory; takes a quarter longer.
@@ -153,7 +153,7 @@ fn tell_memory(cpu: &Cpu, image: &Image) -> Result<()> {
     Ok(())
 }
 
-/// Says how far the edges are off the host's; `true` where none is by more than a tick.
+/// Says how far the edges are from the host's; `true` if none is off by more than a tick.
 fn told(compared: &Compared, world: &World) -> bool {
     let Compared { edges, all, worst, missed, first } = *compared;
     println!(

@@ -1,4 +1,4 @@
-//! Mistakes of a board's code and settings, each made on the way of a write to its register, and whether a short drive shows them.
+//! Mistakes in a board's code and settings, each made by changing a write on the way to its register, and whether a short drive reveals them.
 //!
 //! The drive is the same for all: the link is charged, the motor pulls, then the gate drivers' ready wire drops or a phase carries an
 //! overcurrent. A mistake is caught by a finding, by an expectation that is not met, or by gates that do not go off.
@@ -28,7 +28,7 @@ const SCRIPT: &str = "\
      expect fault none
 0.66 end
 ";
-/// The drive for what shows only where the carrier's halves differ: until a synchronous mode runs.
+/// The drive for mistakes that show only where the carrier's halves differ: it goes on until a synchronous mode runs.
 const SYNCHRONOUS: &str = "\
 0.10 charge
 0.26 enable
@@ -44,11 +44,11 @@ const BREAK: u64 = MICROSECOND;
 const TELEMETRY_S: f64 = 0.01;
 const TELEMETRY_SHARE: f64 = 0.01;
 
-/// The PWM interrupt, as an exception, and the longest time that it may wait: it preempts everything, so for an instruction and its entry.
+/// The PWM interrupt, as an exception, and the longest time that it may wait: it preempts everything, so one instruction and its entry.
 const PWM: usize = 41;
 const WAIT: u64 = MICROSECOND;
 
-/// The edges that every gate has at least in the drive: half of those of a carrier of 900 Hz.
+/// The least number of edges that every gate has in the drive: half of those of a carrier of 900 Hz.
 const PULSES: usize = 300;
 
 /// A mistake, and the change that makes it.
@@ -133,7 +133,7 @@ pub const MISTAKES: [Mistake; 40] = [
     of("watchdog never started", |a, v| if a == 0x4000_3000 && v == 0xCCCC { 0 } else { v }),
 ];
 
-/// Runs the drive of a script with a change; what showed it, or `None`.
+/// Runs the drive of a script with a change; returns what revealed it, or `None`.
 fn caught_in(
     image: &Path,
     script: &str,
@@ -173,7 +173,7 @@ fn caught_in(
     held(&mut cpu, overcurrent)
 }
 
-/// The telemetry's period where it is not the protocol's: by the bus's clock, which is not the drive's.
+/// The telemetry's period if it is not the protocol's, measured by the bus's clock, which is not the drive's.
 fn off_time(rows: &[Vec<String>]) -> Option<String> {
     let instant = |row: &Vec<String>| row.first()?.parse::<f64>().ok();
     let (first, last) = (instant(rows.first()?)?, instant(rows.last()?)?);
@@ -184,7 +184,7 @@ fn off_time(rows: &[Vec<String>]) -> Option<String> {
     })
 }
 
-/// The cause of a break while the gates pulse: whether one is on later than it may be.
+/// The cause of a break while the gates pulse: whether a gate is on later than it may be.
 fn held(cpu: &mut Cpu, overcurrent: bool) -> Result<Option<String>> {
     let machine = cpu.machine_mut();
     machine.world.done = false;
@@ -203,7 +203,7 @@ fn held(cpu: &mut Cpu, overcurrent: bool) -> Result<Option<String>> {
     Ok(world.any_gate().then(|| format!("gates are on 1 µs after {cause}")))
 }
 
-/// A mistake's outcome over both causes of a break, and where none shows it in a synchronous mode; without a mistake likewise.
+/// A mistake's outcome with both causes of a break and, if neither reveals it, in a synchronous mode; the same without a mistake.
 pub fn outcome(image: &Path, mistake: Option<&Mistake>) -> Result<Option<String>> {
     let change = mistake.map(|mistake| mistake.change);
     for (script, overcurrent) in [(SCRIPT, false), (SCRIPT, true), (SYNCHRONOUS, false)] {

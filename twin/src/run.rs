@@ -116,12 +116,12 @@ fn side(system: System, motor: &Motor) -> Side {
     }
 }
 
-/// The address of the instruction that made a finding: the run, prepared anew, once more, its end instruction by instruction; `None` if it does not
-/// come there.
+/// The address of the instruction that made a finding: the run is prepared anew and repeated, its end instruction by instruction; `None` if it does not
+/// get there.
 pub fn instruction(cpu: &mut Cpu, finding: &Finding) -> Result<Option<u32>> {
     cpu.run(finding.at.saturating_sub(MILLISECOND))?;
     cpu.trace()?;
-    // What was found may be the end of the emulator, too.
+    // The finding may end the emulator, too.
     let _ = cpu.run(finding.at + MILLISECOND);
     let again = cpu.machine().findings.all.first();
     Ok(again.filter(|again| again.text == finding.text).map(|again| again.pc))

@@ -1,4 +1,4 @@
-//! Time, in a unit of which every clock of the chip has a whole number in a cycle.
+//! Time, in a unit that fits a whole number of times into a cycle of every clock of the chip.
 
 /// An instant or a length of time, in parts of 1 / 4.08 GHz.
 pub type Time = u64;

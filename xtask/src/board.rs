@@ -1,4 +1,4 @@
-//! The boards of real hardware: the packages in `boards/`, each with what this program has to know of it in its own `Cargo.toml`.
+//! The boards of real hardware: the packages in `boards/`, each with all that this program must know about it in its own `Cargo.toml`.
 
 use crate::workspace::{folders, root};
 use anyhow::{Context, Result};

@@ -34,7 +34,7 @@ impl System {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::Traction, Self::Zs9];
 
-    /// Its image, the folder of tables/ that this is built with, and the variable that names another machine to the build script.
+    /// Its image, the folder of tables/ with which the image is built, and the variable that names another machine to the build script.
     const fn names(self) -> [&'static str; 3] {
         match self {
             Self::Traction => ["tractive", "pmasynrm-180kw", "TRACTIVE_MACHINE"],
@@ -125,7 +125,7 @@ pub fn image_of_stage(toolchain: &Toolchain, board: &Board, stage: &str) -> Resu
     firmware(command, &name, System::Traction, None)
 }
 
-/// `true` for a machine whose `patterns` are "optimal"; all else in its file is the build script's to judge.
+/// `true` for a machine whose `patterns` are "optimal"; the build script judges everything else in its file.
 fn wants_optimal(machine: Option<&OsString>, system: System) -> Result<bool> {
     let machine = machine.map_or_else(|| system.machine().into(), OsString::clone);
     let file = root().join("tables").join(machine).join("machine.toml");
@@ -161,8 +161,7 @@ pub fn bench(toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
         .context("the bench was not built")
 }
 
-/// Builds the reference images, which are of one set of features, at once: each core links one. Then they are there for whoever asks
-/// for one of them.
+/// Builds the reference images with the same set of features at once: each core links one. Afterwards each is there for any caller that asks for it.
 pub fn reference_images(toolchain: &Toolchain) -> Result<bool> {
     let [of_traction, of_zs9] = System::ALL.map(|system| [system.image(), system.pi_image()]);
     let mut command = on_target(toolchain, "tractive", IDENTIFY);
@@ -196,8 +195,8 @@ pub fn rig() -> Result<PathBuf> {
     executable(&mut command, "tractive-rig", false).context("the rig was not built")
 }
 
-/// Runs a `cargo build` and returns where it says the executable is. `own_data` means that the user's data goes into
-/// the build: then what the build script says about it stands alone, without cargo's frame around it.
+/// Runs a `cargo build` and returns the path of the executable as cargo reports it. `own_data` means that the user's data goes into the build: then the
+/// build script's message about it stands alone, without cargo's frame around it.
 fn executable(command: &mut Command, name: &str, own_data: bool) -> Result<PathBuf> {
     command.arg("--message-format=json-render-diagnostics").stdin(Stdio::null()).stdout(Stdio::piped());
     command.stderr(if own_data { Stdio::piped() } else { Stdio::inherit() });

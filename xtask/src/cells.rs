@@ -1,8 +1,8 @@
 //! The cells in the emulator, with the higher-priority interrupt landing on every instruction of the other side's access.
 //!
-//! The image `cell_stress` sweeps the phase of two timers and says what was read and where its interrupts landed. Here it is judged:
-//! no sound cell may have been torn, stale or empty; each broken one must have been torn; and every instruction of every access,
-//! as the image's symbols and its code give them, must have been hit.
+//! The image `cell_stress` sweeps the phase of two timers and reports what was read and where its interrupts landed. Here the report is judged: no
+//! sound cell may have been torn, stale or empty; each broken one must have been torn; and every instruction of every access, as given by the image's
+//! symbols and code, must have been hit.
 
 use crate::elf::Image;
 use crate::setup::Setup;
@@ -21,7 +21,7 @@ const NANOSECONDS_SHIFT: u32 = 6;
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Said {
     rounds: u32,
-    /// Control interrupts that outlived their period: then the sweep was none.
+    /// Control interrupts that lasted longer than their period: then the sweep is not valid.
     late: u32,
     cells: BTreeMap<String, Counts>,
     /// The addresses at which interrupts landed.
@@ -92,7 +92,7 @@ fn is_broken(name: &str) -> bool {
     name.starts_with("broken-")
 }
 
-/// A reader of these finds nothing, or may give up.
+/// A reader of these subjects finds nothing, or may give up.
 fn may_miss(name: &str) -> bool {
     name.starts_with("burst-") || name.starts_with("ring-") || name.ends_with("-empty")
 }

@@ -1,8 +1,7 @@
-//! The contents that no image may hold: double-precision arithmetic in software, and a way from an interrupt into a panic.
+//! The contents that no image may hold: double-precision arithmetic in software, and a call path from an interrupt to a panic.
 //!
-//! The second goes by the names of functions. A panic function that was inlined whole leaves no name, so the check
-//! finds what is there and proves only as much as the names tell; the standard library keeps its panic functions
-//! out of line.
+//! The second check uses the names of functions. A panic function that was inlined completely leaves no name, so the check finds what is there and
+//! proves only as much as the names tell; the standard library keeps its panic functions out of line.
 
 use crate::elf::{Function, Image};
 use crate::graph::CallGraph;
@@ -32,7 +31,7 @@ fn is_soft_double(name: &str) -> bool {
     }
 }
 
-/// The ways from the vector table's handlers into a panic.
+/// The call paths from the vector table's handlers to a panic.
 pub fn panic_paths(image: &Image) -> Vec<String> {
     if image.functions.is_empty() {
         return vec!["the image names no functions, so its calls cannot be followed".to_owned()];
@@ -44,7 +43,7 @@ pub fn panic_paths(image: &Image) -> Vec<String> {
     let mut findings = Vec::new();
     let mut seen = Vec::new();
     for (entry, address) in &image.handlers {
-        // Entries nobody filled share the default handler: one look is enough.
+        // Unused entries share the default handler: one look is enough.
         if seen.contains(address) {
             continue;
         }
@@ -128,7 +127,7 @@ mod tests {
         all(others, false, is_panic);
     }
 
-    /// handler: bl step, bx lr; step: b.w the third; the panic besides, called by nobody here.
+    /// handler: bl step, bx lr; step: b.w the third; the panic besides, called by no function here.
     fn image(third: &str) -> Image {
         let functions: [(&str, u32, &[u16]); 4] = [
             ("handler", 0x100, &[0xF000, 0xF806, 0x4770]),

@@ -33,7 +33,7 @@ pub enum Command {
     Test(TestArgs),
     /// Build the image and print what is in it
     Image(ImageArgs),
-    /// Instructions per interrupt against their budgets
+    /// Count instructions per interrupt and compare them with their budgets
     Timing(TimingArgs),
     /// Build a board's image and flash it with probe-rs
     Flash(FlashArgs),
@@ -55,11 +55,11 @@ pub struct FuzzArgs {
     /// Time of each, in s; as many run at once as there are cores
     #[arg(long, value_name = "N", default_value_t = 60)]
     pub seconds: u32,
-    /// From the kept inputs alone, in the order of this seed: with 1 the inputs of the tests' step, for longer [default: from all that was
-    /// found here, at random]
+    /// From the kept inputs alone, in the order of this seed: with 1 the inputs of the tests' step, for longer [default: at random from all that was
+    /// found here]
     #[arg(long, value_name = "N", conflicts_with = "keep")]
     pub seed: Option<u32>,
-    /// Add to fuzz/corpus what reaches code that it does not
+    /// Add to fuzz/corpus the inputs that reach code that it does not
     #[arg(long)]
     pub keep: bool,
 }
@@ -83,7 +83,7 @@ pub struct TestArgs {
     /// Only this step (may be repeated)
     #[arg(long, value_enum, value_name = "STEP")]
     pub only: Vec<Step>,
-    /// Name the steps and do nothing
+    /// List the steps and do nothing else
     #[arg(long)]
     pub list: bool,
 }
@@ -100,13 +100,13 @@ pub struct TimingArgs {
     /// As one JSON object
     #[arg(long)]
     pub json: bool,
-    /// Take the numbers into docs/cost.md and sizes.toml
+    /// Write the numbers into docs/cost.md and sizes.toml
     #[arg(long)]
     pub write: bool,
-    /// Measure the image that identifies its machine instead, against budgets of its own
+    /// Measure the image that identifies its machine instead, against its own budgets
     #[arg(long, conflicts_with_all = ["json", "write", "profile"])]
     pub identify: bool,
-    /// Say where the instructions go: this many functions of each interrupt
+    /// List the functions where the instructions go: this many for each interrupt
     #[arg(long, value_name = "FUNCTIONS", num_args = 0..=1, default_missing_value = "20", conflicts_with = "json")]
     pub profile: Option<usize>,
 }
@@ -125,10 +125,10 @@ pub struct FlashArgs {
     /// A folder of tables/, or the path of any machine folder [default: the system's own]
     #[arg(long, value_name = "NAME|PATH")]
     pub machine: Option<String>,
-    /// Stay and print the firmware's log
+    /// Stay connected and print the firmware's log
     #[arg(long)]
     pub log: bool,
-    /// Build the image, and only say what probe-rs would be called with
+    /// Build the image, and only print how probe-rs would be called
     #[arg(long)]
     pub dry_run: bool,
 }
@@ -166,7 +166,7 @@ pub struct LiveArgs {
     /// Options of `rig live`
     #[arg(last = true, value_name = "OPTIONS", requires = "in_qemu")]
     pub words: Vec<OsString>,
-    /// Take the guide's pictures into this folder instead
+    /// Write the guide's pictures into this folder instead
     #[arg(long, value_name = "DIR", conflicts_with = "build_only")]
     pub screenshots: Option<PathBuf>,
 }

@@ -68,7 +68,7 @@ impl Image {
         Ok(image)
     }
 
-    /// Decodes the code anew, between literals.
+    /// Decodes the code between literals again.
     pub fn read_instructions(&mut self) -> Result<()> {
         let mut instructions = BTreeMap::new();
         for (&start, bytes) in &self.code {
@@ -91,7 +91,7 @@ impl Image {
         Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?))
     }
 
-    /// `true` if the code at this address is instructions, not literals.
+    /// `true` if the code at this address consists of instructions, not literals.
     pub fn is_code(&self, address: u32) -> bool {
         self.mapping.range(..=address).next_back().is_none_or(|(_, is_code)| *is_code)
     }
@@ -189,7 +189,7 @@ impl Image {
         Ok(())
     }
 
-    /// Functions written in assembly carry no size: they reach to the next one, or to the end of the section.
+    /// Functions written in assembly have no size: they extend to the next one, or to the end of the section.
     fn close_gaps(&mut self) {
         let starts: Vec<u32> = self.functions.keys().copied().collect();
         for (index, start) in starts.iter().enumerate() {

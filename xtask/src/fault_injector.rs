@@ -10,13 +10,13 @@ use std::process::Command;
 /// The file that the image reads and writes.
 const FOUND: &str = "found";
 
-/// Everything that it takes to run one.
+/// Everything that is needed to run one.
 pub struct FaultInjector {
     pub rig: PathBuf,
     pub qemu: PathBuf,
     pub image: PathBuf,
     pub system: System,
-    /// The rig's scenario: at first that for `cargo xtask timing`.
+    /// The rig's scenario: initially the one for `cargo xtask timing`.
     pub scenario: &'static str,
 }
 
@@ -26,7 +26,7 @@ pub struct Found {
     /// The fault's name as it came over the link; empty without one.
     pub fault: String,
     pub gates_off: Option<GatesOff>,
-    /// Control interrupts, where that was asked for.
+    /// Control interrupts, if they were asked for.
     pub seen: Vec<Seen>,
 }
 
@@ -35,7 +35,7 @@ pub struct Found {
 pub struct Seen {
     /// Its number, from 0.
     pub number: usize,
-    /// From its coming to the next carrier boundary, in ticks.
+    /// Time from its arrival to the next carrier boundary, in ticks.
     pub left_ticks: u32,
     /// The address at which a PWM interrupt landed in it.
     pub landed: Option<u32>,
@@ -63,13 +63,13 @@ impl FaultInjector {
         Ok(Self { rig, qemu, image, system, scenario })
     }
 
-    /// The argument by which the image gets its orders: the fault, and where it writes what came of it.
+    /// The argument that gives the image its orders: the fault, and the file for the outcome.
     pub fn orders(kind: &str, at_ticks: u32, amount: u32, found: &Path) -> [String; 2] {
         let orders = format!("{kind} {at_ticks} {amount} {}", found.display());
         ["--qemu-arg=-append".to_owned(), format!("--qemu-arg={orders}")]
     }
 
-    /// Runs the scenario with each control interrupt beginning so many instructions after it came.
+    /// Runs the scenario; each control interrupt begins so many instructions after it arrived.
     pub fn delay(&self, instructions: &[u16], options: &[&str], out: &Path) -> Result<Found> {
         let bytes: Vec<u8> = instructions.iter().flat_map(|count| count.to_le_bytes()).collect();
         std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;

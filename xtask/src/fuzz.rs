@@ -1,7 +1,7 @@
 //! `cargo xtask fuzz`: coverage-guided fuzzing of the targets in `fuzz/`, a workspace of its own, by libFuzzer.
 //!
-//! The counters of what is reached are put in by a pass of LLVM that every toolchain has: neither a nightly one nor cargo-fuzz is
-//! needed, only a C++ compiler for libFuzzer itself.
+//! A pass of LLVM that every toolchain has inserts the counters of what is reached: neither a nightly toolchain nor cargo-fuzz is needed, only a C++
+//! compiler for libFuzzer itself.
 
 use crate::cli::FuzzArgs;
 use crate::process::{cannot_start, find, output_of, succeeds};
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The flags with which what is fuzzed counts what it reaches, and tells what it compares.
+/// The flags with which the fuzzed code counts what it reaches and reports what it compares.
 const FLAGS: [&str; 6] = [
     "-Cpasses=sancov-module",
     "-Cllvm-args=-sanitizer-coverage-level=4",
@@ -21,25 +21,25 @@ const FLAGS: [&str; 6] = [
     "--cfg=fuzzing",
 ];
 
-/// Longest input, in bytes: of most targets, and of a machine folder's files.
+/// Longest input, in bytes: for most targets, and for a machine folder's files.
 const LONGEST: usize = 512;
 const LONGEST_FILE: usize = 4_096;
 
-/// Time of each target in the tests, in s, and its seed: the inputs of a change are the same wherever it is tested.
+/// Time of each target in the tests, in s, and its seed: a change is tested with the same inputs everywhere.
 const MINUTE_S: u32 = 60;
 const SEED: u32 = 1;
-/// Inputs after which a target ends before its minute. Of `wire`, which decodes words and keeps nothing from one to the next, the last that reached what none had before
-/// was before number 80,000 of the seed's in two builds, and none of the millions after it. No other target comes so far in a minute.
+/// Inputs after which a target ends before its minute. `wire` decodes words and keeps nothing from one input to the next: the last input that reached
+/// anything new came before number 80,000 of the seed's in two builds, and none of the millions after it did. No other target gets so far in a minute.
 const ENOUGH: u64 = 2_000_000;
 
-/// Origin of the inputs: the kept ones alone, and the seed's; or all that have grown on this machine, too, and anything.
+/// Origin of the inputs: the kept ones and the seed's alone; or also all that have accumulated on this machine, and any others.
 #[derive(Clone, Copy)]
 enum Origin {
     Seed(u32),
     Any,
 }
 
-/// The end of a target's run: a time in s, or that many inputs before.
+/// The end of a target's run: after a time in s, or earlier after that many inputs.
 #[derive(Clone, Copy)]
 struct Length {
     seconds: u32,
@@ -85,7 +85,7 @@ fn targets() -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// Builds the targets; the folder that they are in. The inner error is what is missing.
+/// Builds the targets; returns the folder that they are in. The inner error is what is missing.
 fn build() -> Result<Result<PathBuf, String>> {
     if std::env::var_os("CXX").is_none() && find("c++").is_none() {
         return Ok(Err("there is no C++ compiler for libFuzzer (Debian: apt-get install g++)".to_owned()));
@@ -99,7 +99,7 @@ fn build() -> Result<Result<PathBuf, String>> {
     let host = version.lines().find_map(|line| line.strip_prefix("host: ")).context("rustc names no host")?;
     let out = root().join("target/fuzz");
     let mut command = cargo();
-    // With a target named the flags are not those of build scripts, which with their macros lie compiled in the workspace's own folder.
+    // With a target named, build scripts do not get the flags; they and their macros are already compiled in the workspace's own folder.
     command.env("CARGO_BUILD_BUILD_DIR", root().join("target"));
     command.args(["build", "--release", "--locked", "--manifest-path", "fuzz/Cargo.toml", "--target", host]);
     command.arg("--target-dir").arg(&out).env("CARGO_ENCODED_RUSTFLAGS", FLAGS.join("\x1f"));
@@ -109,14 +109,14 @@ fn build() -> Result<Result<PathBuf, String>> {
     Ok(Ok(out.join(host).join("release")))
 }
 
-/// The corpora: the kept ones, and those that grow on this machine.
+/// The corpora: the kept ones, and those that accumulate on this machine.
 fn corpora(target: &str) -> Result<[PathBuf; 2]> {
     let corpora = ["fuzz/corpus", "target/fuzz/corpus"].map(|folder| root().join(folder).join(target));
     corpora.iter().try_for_each(std::fs::create_dir_all)?;
     Ok(corpora)
 }
 
-/// Runs these targets, on every core one at a time; whether nothing was found.
+/// Runs these targets, one at a time on each core; returns whether nothing was found.
 fn fuzz(folder: &Path, targets: &[String], length: Length, origin: Origin) -> Result<bool> {
     let good = targets.par_iter().map(|target| run_target(folder, target, length, origin));
     Ok(good.collect::<Result<Vec<_>>>()?.into_iter().all(|good| good))
@@ -155,7 +155,7 @@ fn run_target(folder: &Path, target: &str, length: Length, origin: Origin) -> Re
         println!("{target}: {}", log.lines().rfind(|line| line.contains("DONE")).unwrap_or_default());
         return Ok(true);
     }
-    // The panic's place and its message, and where the input is.
+    // The place of the panic and its message, and where the input is.
     let panic = log.lines().skip_while(|line| !line.contains("panicked at")).take(2);
     let written =
         log.lines().filter(|line| line.contains("ERROR: ") || line.contains("Test unit written to"));
@@ -166,7 +166,7 @@ fn run_target(folder: &Path, target: &str, length: Length, origin: Origin) -> Re
     Ok(false)
 }
 
-/// Adds to a kept corpus what reaches code that it does not.
+/// Adds to a kept corpus the inputs that reach code that it does not.
 fn keep(folder: &Path, target: &str) -> Result<()> {
     let [kept, own] = corpora(target)?;
     if !succeeds(

@@ -1,6 +1,5 @@
-//! The call graph. Direct branches are decoded; where a function holds another one's address (put
-//! together by MOVW and MOVT, or as a literal) it is taken to call it; a function that branches through a register
-//! may besides go to any function whose address stands in the data.
+//! The call graph. Direct branches are decoded; a function that holds another one's address (assembled by MOVW and MOVT, or as a literal) is taken to
+//! call it; a function that branches through a register may also go to any function whose address stands in the data.
 
 use crate::elf::Image;
 use crate::thumb::Flow;
@@ -60,7 +59,7 @@ fn pointed_function(image: &Image, word: u32) -> Option<u32> {
     (word & 1 == 1 && image.functions.contains_key(&start)).then_some(start)
 }
 
-/// The functions whose addresses a function holds: from halves, or as literals.
+/// The functions whose addresses a function holds, assembled from halves or as literals.
 fn held(image: &Image, start: u32, size: u32) -> BTreeSet<u32> {
     let literals = (start.next_multiple_of(4)..start.saturating_add(size)).step_by(4);
     let mut words: Vec<u32> =

@@ -1,11 +1,11 @@
-//! The commands of the engineer's guide, run as they stand there: an option that is renamed fails here.
+//! The commands of the engineer's guide, run as they stand there, so that a renamed option fails here.
 //!
-//! They are the lines of the `sh` blocks in the chapters of `docs/SUMMARY.md`. A line that ends in `# exits with N` has to; all
-//! others have to succeed. What would touch a board is given `--dry-run`: the image is built, and nobody is asked to flash it.
-//! A command that stands in several places is run at the first of them; what it prints is looked at in each.
-//! Tests are built, steps of `cargo xtask test` looked up, and what would run in QEMU runs on the host: the rest is those steps' own business.
+//! They are the lines of the `sh` blocks in the chapters of `docs/SUMMARY.md`. A line that ends in `# exits with N` must exit with N; all others must
+//! succeed. Commands that would touch a board get `--dry-run`: the image is built but not flashed. A command that stands in several places is run at
+//! the first of them; its output is checked in each. Tests are only built, steps of `cargo xtask test` are only looked up, and what would run in QEMU
+//! runs on the host: the rest is the business of those steps.
 //!
-//! A block ```` ```text prints ```` behind a command holds lines that it has to print, in this order; `…` stands for what is left out.
+//! A block ```` ```text prints ```` after a command holds lines that the command must print, in this order; `…` stands for omitted text.
 
 use crate::process::cannot_start;
 use anyhow::{Context, Result, bail};
@@ -14,7 +14,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// A command, the exit code that it has to have, and lines that it has to print.
+/// A command, the exit code that it must have, and lines that it must print.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Line {
     chapter: String,
@@ -26,7 +26,7 @@ struct Line {
 /// The first line of a block of what is printed.
 const PRINTS: &str = "```text prints";
 
-/// The folder of the guide's files: what an earlier build has left there is not gone on with.
+/// The folder of the guide's files: files left there by an earlier build are not used.
 const FILES: &str = "target/guide";
 
 /// Runs them all; `true` is good.
@@ -98,7 +98,7 @@ fn commands(chapter: &str, text: &str) -> Vec<Line> {
     lines
 }
 
-/// The first of the lines that does not stand in a text, behind the one before it.
+/// The first of the lines that does not occur in a text after the line before it.
 fn missing<'a>(text: &str, lines: &'a [String]) -> Option<&'a String> {
     let mut left = text.lines();
     let has = |line: &str, wanted: &str| {
@@ -128,7 +128,7 @@ fn command(chapter: &str, line: &str) -> Line {
     if command.starts_with("cargo xtask live") {
         command = "cargo xtask test --only live --list".to_owned();
     }
-    // A page is served until somebody has seen enough.
+    // A page is served until its reader has seen enough.
     if command.starts_with("cargo rig live") {
         command += " --help";
     }

@@ -1,4 +1,4 @@
-//! `cargo xtask image`: what the image holds.
+//! `cargo xtask image`: the contents of the image.
 
 use crate::board::Board;
 use crate::cli::ImageArgs;
@@ -22,7 +22,7 @@ pub fn run(args: &ImageArgs) -> Result<u8> {
     Ok(0)
 }
 
-/// The image's check as a step of the tests: what it finds is printed, `true` is good.
+/// The image's check as a step of the tests: its findings are printed, `true` is good.
 pub fn check(path: &Path) -> Result<bool> {
     let image = read(path)?;
     let is_good = process::is_good(&check::findings(&image));
@@ -34,10 +34,10 @@ pub fn check(path: &Path) -> Result<bool> {
     Ok(is_good)
 }
 
-/// The least that a board's image leaves for its stack, in bytes: the longest that the timing and the twin have seen is half of it.
+/// The least stack that a board's image must leave, in bytes: the deepest that the timing and the twin have seen is half of it.
 const LEAST_STACK: u64 = 4_096;
 
-/// The same for a board of real hardware, whose image must also lie where its flash memory is, and leave room for the stack.
+/// The same for a board of real hardware, whose image must also lie in its flash memory and leave room for the stack.
 pub fn check_board(path: &Path, board: &Board) -> Result<bool> {
     let (image, wanted) = (read(path)?, board.flashed.flash_origin);
     let (is_there, has_room) = (image.origin == wanted, image.sizes.stack >= LEAST_STACK);

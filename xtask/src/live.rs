@@ -1,4 +1,4 @@
-//! `cargo xtask live`: the live bench, which is a workspace of its own in `live/`, built and served; and looked at in a browser.
+//! `cargo xtask live`: the live bench, a workspace of its own in `live/`, built, served, and checked in a browser.
 
 use crate::build::{self, System};
 use crate::cli::LiveArgs;
@@ -43,8 +43,8 @@ pub fn run(args: &LiveArgs) -> Result<u8> {
     Ok(u8::from(!succeeds(&mut serve)?))
 }
 
-/// The step: format and lints of what no other step sees, then the page in a browser beside the host's sweep. The inner error is what
-/// is missing.
+/// The step: format and lints of what no other step checks, then the page in a browser compared with the host's sweep. The inner error is what is
+/// missing.
 pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     if !setup.wasm() {
         return Ok(Err(no_target()));
@@ -63,7 +63,7 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     for report in [sweep.join("report.html")].iter().chain(&reports) {
         check.arg("--report").arg(report);
     }
-    // The page of a drive elsewhere: the image in QEMU where there is one, as `live --in-qemu` has it.
+    // The page of a drive elsewhere: the image in QEMU if there is one, as for `live --in-qemu`.
     match (setup.qemu(), setup.toolchain()) {
         (Ok(qemu), Ok(toolchain)) => {
             let image = build::image(&toolchain, System::Zs9, None)?;
@@ -84,8 +84,8 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
 /// The rig's words for the host's sweep; `OUT` is its folder.
 const SWEEP: &str = "run sweep --on host --out OUT";
 
-/// Commands whose pages are looked at besides the sweep's, with their exit codes: pictures of a paper, the other system, its longest run, a
-/// drive that trips, one that is commanded over its protocol, a machine.
+/// Commands whose pages are checked besides the sweep's, with their exit codes: pictures of a paper, the other system, its longest run, a drive that
+/// trips, one that is commanded over its protocol, a machine.
 const REPORTS: [(&str, &str, i32); 6] = [
     ("characteristic", "run characteristic --on host --out OUT", 0),
     ("zs9-load-step", "run zs9-load-step --on host --out OUT", 0),
@@ -130,7 +130,7 @@ fn is_tidy(setup: &mut Setup) -> Result<bool> {
 fn live() -> Command {
     let mut command = cargo();
     command.current_dir(root().join("live"));
-    // The build script takes the machines that are built in.
+    // The build script uses the machines that are built in.
     for system in System::ALL {
         command.env_remove(system.machine_variable());
     }
@@ -157,7 +157,7 @@ fn make(page: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A folder as it was typed, from anywhere.
+/// A folder as it was typed, usable from any directory.
 fn absolute(folder: &Path) -> Result<PathBuf> {
     std::path::absolute(folder).with_context(|| folder.display().to_string())
 }

@@ -13,13 +13,13 @@
 //! | `fuzz [TARGET]… [--seconds N]` | coverage-guided fuzzing of the targets in `fuzz/` |
 //! | `mutants [--area NAME] [--shard K/N] [--sample N]` | mutation testing, by the program of `mutants/` |
 //!
-//! Results go to standard output, what the command does on the way to standard error. Exit codes: 0 done; 1 it ran
-//! and something failed; 2 it could not run (bad usage, bad input, something missing), with the reason on a line.
+//! Results go to standard output, progress messages to standard error. Exit codes: 0 done; 1 it ran and something failed; 2 it could not run (bad
+//! usage, bad input, something missing), with the reason on one line.
 //!
 //! The modules: [`cli`] is what may be typed, [`setup`] what has to be installed, [`build`] how cargo is called, [`board`] which boards there are,
-//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`], [`flash`], [`twin`], [`fuzz`] and [`mutants`] the commands; [`guide`] runs those of the documentation. An image is read by [`elf`],
-//! its instructions by [`thumb`]; [`graph`] says which function calls which, [`check`] refuses what an image must not hold, and [`cells`]
-//! looks at what the cells did under the interrupts, in the [`emulator`].
+//! [`run`], [`mod@test`], [`image`], [`timing`], [`live`], [`flash`], [`twin`], [`fuzz`] and [`mutants`] the commands; [`guide`] runs those of the
+//! documentation. An image is read by [`elf`], its instructions by [`thumb`]; [`graph`] says which function calls which, [`check`] refuses what an
+//! image must not hold, and [`cells`] looks at what the cells did under the interrupts, in the [`emulator`].
 
 #![forbid(unsafe_code)]
 

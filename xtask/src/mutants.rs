@@ -1,11 +1,11 @@
-//! `cargo xtask mutants`: the program of mutants/, with the words that it was given.
+//! `cargo xtask mutants`: the program of mutants/, with the arguments that it was given.
 
 use crate::workspace::cargo_with;
 use anyhow::Result;
 use std::ffi::OsStr;
 
-/// The sample of the tests' step, against the quick tests of the packages that it is from. The least is a little below what it was when it was last
-/// measured, all of 182: a guard that only rises.
+/// The sample of the tests' step, tried against the quick tests of the packages that it comes from. The least share is a little below the last measured
+/// one, all of 182: a guard that only rises.
 const SAMPLE: &str = "--tests tractive-control --tests tractive --tests tractive-tablegen --tests tractive-nucleo-g474re --longest 1 --budget 4 --sample 200 --seed 1 --changed 20 --least 99";
 
 /// The command; its exit code.

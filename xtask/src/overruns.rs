@@ -1,5 +1,5 @@
-//! Interrupts slow, late and lost in the emulator, with the real images: each injected fault is called by its name, and the gates are off within
-//! a carrier period.
+//! Interrupts that are slow, late and lost in the emulator, with the real images: each injected fault is reported by its name, and the gates are off
+//! within a carrier period.
 
 use crate::build::System;
 use crate::fault_injector::{FaultInjector, Found};
@@ -20,13 +20,13 @@ struct Case {
     options: &'static [&'static str],
     /// The time, in s from the run's beginning.
     at_s: f64,
-    /// The name of what runs then.
+    /// The name of the mode or carrier that runs then.
     name: &'static str,
     /// From a control tick to its deadline.
     deadline_ticks: u32,
-    /// For how long a PWM interrupt may be late.
+    /// The time by which a PWM interrupt may be late.
     late_ticks: u32,
-    /// Halves, or carrier periods of the ZS9, that the gates may stay on.
+    /// Number of halves, or of carrier periods on the ZS9, for which the gates may stay on.
     within_halves: u32,
 }
 
@@ -53,8 +53,8 @@ const QUICK: Case = Case {
 
 /// Each mode once, and both carriers of the ZS9.
 const CASES: [Case; 9] = [
-    // Not at 0.050 s: there the PWM interrupt, 10 ticks later, comes before control has acknowledged its timer; the delay follows it, a tick passes
-    // unseen, and is named as one that is lost: `stale_command`.
+    // Not at 0.050 s: there the PWM interrupt, 10 ticks later, comes before control has acknowledged its timer. The delay follows it, and a tick passes
+    // unseen; this is reported as a lost one: `stale_command`.
     Case { at_s: 0.050_2, name: "async", ..TRACTION },
     Case { at_s: 0.090, name: "sync15", ..TRACTION },
     Case { at_s: 0.140, name: "sync12", ..TRACTION },
@@ -70,18 +70,18 @@ const CASES: [Case; 9] = [
         late_ticks: 1_250,
         within_halves: 1,
     },
-    // The first and the second peak behind a control tick.
+    // The first and the second peak after a control tick.
     Case { at_s: 0.060, name: "20 kHz", ..QUICK },
     Case { at_s: 0.060_05, name: "20 kHz", ..QUICK },
 ];
 
-/// An injected fault, what it is to be called, and from when on its time counts.
+/// An injected fault, the name under which it must be reported, and the time from which its reaction time counts.
 struct InjectedFault {
     kind: &'static str,
     /// In ticks, or interrupts.
     amount: u32,
     fault: &'static str,
-    /// From the tick that the fault is for to what is amiss, in ticks: 0, or the missed deadline.
+    /// From the tick at which the fault is injected to the first deviation, in ticks: 0, or the missed deadline.
     amiss_after_ticks: u32,
 }
 
@@ -139,7 +139,7 @@ impl Case {
     }
 }
 
-/// A run: where the fault's time and amount make no difference, they are 0, so that it is the same for many cases.
+/// A run: the fault's time and amount are 0 if they make no difference, so that one run serves many cases.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Run {
     system: System,

@@ -1,5 +1,5 @@
-//! The library as others use it: the example's firmware, outside the workspace, has its own vectors and both tasks, and nothing of the
-//! reference images; and the arithmetic alone needs little.
+//! The library as others use it: the example's firmware, outside the workspace, has its own vectors and both tasks, and nothing of the reference
+//! images; and the arithmetic alone needs few dependencies.
 
 use crate::build::{self, TARGET};
 use crate::elf::Image;
@@ -10,7 +10,7 @@ use crate::timing::Profile;
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 
-/// The example's interrupts: their entries in the vector table, their handlers, and the task that each must come to.
+/// The example's interrupts: their entries in the vector table, their handlers, and the task that each must reach.
 const INTERRUPTS: [(&str, &str, &str); 2] =
     [("interrupt 25", "TIM1_UP", "PwmTask"), ("interrupt 28", "TIM2", "ControlTask")];
 
@@ -21,7 +21,7 @@ const FOREIGN: [&str; 7] =
 /// Crates that `tractive-control` may come with, itself among them.
 const MOST_CRATES: usize = 2;
 
-/// Builds the example with link-time optimisation and without, and looks into both; counts what the arithmetic depends on.
+/// Builds the example with and without link-time optimisation, and checks both; counts the dependencies of the arithmetic.
 pub fn check(setup: &mut Setup) -> Result<bool> {
     for lto in ["fat", "off"] {
         let path = example(setup, lto)?;

@@ -1,11 +1,11 @@
 //! The PWM interrupt on every instruction of the control interrupt, in the emulator, with the real images.
 //!
-//! An undisturbed run is logged: so it is known what each control interrupt executes, and how many instructions behind its beginning. Then
-//! the same is run again and again, and each control interrupt that a carrier boundary comes near enough begins by so many instructions
-//! later that the PWM interrupt lands on the one that is wanted; its instant stays what it was. The emulator's time is a count of
-//! instructions, so one landing in a control interrupt tells by which delay each other one is reached. Where it landed is the return
-//! address on its stack. Nothing may change: trace and edges of each pass are those of the undisturbed run, byte for byte. Every
-//! instruction has to be hit but those that no boundary can come at; [`reach`] says which, [`search`] chooses the delays.
+//! An undisturbed run is logged, which shows what each control interrupt executes, and how many instructions after its beginning. Then the same run is
+//! repeated many times. Each control interrupt that a carrier boundary comes near enough begins so many instructions later that the PWM interrupt lands
+//! on the wanted instruction; the interrupt's instant stays the same. The emulator's time is a count of instructions, so one landing in a control
+//! interrupt tells which delay reaches each other instruction. Where it landed is the return address on its stack. Nothing may change: trace and edges
+//! of each pass are those of the undisturbed run, byte for byte. Every instruction must be hit except those that no boundary can reach; [`reach`] says
+//! which, [`search`] chooses the delays.
 
 mod reach;
 mod search;
@@ -24,16 +24,16 @@ use search::Search;
 use std::collections::HashSet;
 use std::path::Path;
 
-/// The course that one system is driven through.
+/// The course of runs through which one system is driven.
 struct Course {
     system: System,
-    /// Scenarios and options of the rig, a run each: the first through every mode.
+    /// Scenarios and options of the rig, one run each: the first goes through every mode.
     runs: &'static [(&'static str, &'static [&'static str])],
     /// The control period, and from a control interrupt to its deadline, in ticks.
     control_ticks: u32,
     deadline_ticks: u32,
-    /// The most instructions that may be left and that no reason excuses: what is executed a few times a run, mostly far from a boundary. Each
-    /// is named.
+    /// The most instructions that may be left without an excuse: instructions that are executed a few times a run, mostly far from a boundary. Each is
+    /// named.
     most_missing: usize,
 }
 
@@ -44,8 +44,8 @@ const INSTRUCTIONS_PER_TICK: u32 = 10;
 const COURSES: [Course; 2] = [
     Course {
         system: System::Traction,
-        // With control so slow that a carrier half is shorter than two of its periods: all stages of the law run in each, so a boundary
-        // comes at each of them. At phases of the timers where a boundary meets what control does every fifty periods, and once a switch.
+        // With control so slow that a carrier half is shorter than two of its periods: each half then contains all stages of the law, so a boundary
+        // comes at each. With phases of the timers where a boundary meets what control does every fifty periods, and once a switch.
         runs: &[
             ("timing", &["--to=2500", "--control-hz=3125"]),
             ("borders-timing", &["--pwm-delay-us=25", "--control-hz=3125"]),
@@ -55,7 +55,7 @@ const COURSES: [Course; 2] = [
         ],
         control_ticks: 8_000,
         deadline_ticks: 8_000,
-        // 83 are left, of what ends a measurement of the position sensor's errors: where a boundary could come, twice a run.
+        // 83 are left, at the end of a measurement of the position sensor's errors: where a boundary could come, twice a run.
         most_missing: 88,
     },
     // At 10 kHz the PWM interrupt comes at control's deadline.
@@ -68,18 +68,18 @@ const COURSES: [Course; 2] = [
     },
 ];
 
-/// Passes of a run that go on at once, and how often at most.
+/// Passes of a run that are made at once, and the largest number of rounds.
 const AT_ONCE: usize = 2;
 const MOST_ROUNDS: usize = 24;
-/// A run that another one follows ends with a round that has hit fewer new instructions.
+/// A run that is followed by another one ends with a round that has hit fewer new instructions than this.
 const LEAST_NEW: usize = 12;
-/// The link's shortest way, in instructions.
+/// The link's shortest path, in instructions.
 const LINK: u32 = 20;
 
 /// One control interrupt of the undisturbed run.
 struct Call {
     mode: String,
-    /// Its own instructions in their order, and how many had been executed before each of them since it began.
+    /// Its own instructions in their order, and the number executed before each of them since it began.
     path: Vec<(u32, u32)>,
     /// Instructions before its samples.
     sampled: u32,
@@ -139,7 +139,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Adds what it reaches; what it finds.
+    /// Adds what it reaches; returns its findings.
     fn check(&self, reached: &mut Reached) -> Result<Vec<String>> {
         let folder = |name: &str| self.folder.join(name);
         let undisturbed = || self.undisturbed(&folder("undisturbed"));
@@ -176,7 +176,7 @@ impl Run<'_> {
         Ok(findings)
     }
 
-    /// Runs with these delays, all at once, and what must not change of each.
+    /// Makes the passes with these delays, all at once; returns for each its outcome and what must not change.
     fn passes(&self, delays: &[Vec<u16>]) -> Result<Vec<(Found, [Vec<u8>; 2])>> {
         let passes = delays.par_iter().enumerate().map(|(number, delays)| {
             let folder = self.folder.join(number.to_string());
@@ -186,7 +186,7 @@ impl Run<'_> {
         passes.collect()
     }
 
-    /// The outcome of a run in which nothing is done to the interrupts, and the files that must not change.
+    /// The outcome of a run whose interrupts are left alone, and the files that must not change.
     fn undisturbed(&self, folder: &Path) -> Result<(Found, [Vec<u8>; 2])> {
         let found = self.injector.run(("none", 0, 0), &self.options, folder)?;
         Ok((found, files(folder)?))
@@ -207,7 +207,7 @@ impl Run<'_> {
         let log = folder.join("log");
         // No delays.
         std::fs::write(&log, [])?;
-        // The way into control is that of the passes.
+        // The path into control is the same as in the passes.
         let orders = FaultInjector::orders("landing", 0, 0, &log);
         let options: Vec<_> = orders.iter().map(String::as_str).chain(self.options.iter().copied()).collect();
         let drive = bench.drive(&options)?;
@@ -231,7 +231,7 @@ impl Run<'_> {
 /// The beginning of the names of the injector's own functions.
 const INJECTOR: &str = "tractive_fault_injector::";
 
-/// Half-words of what leads to the interrupt and is not its own.
+/// Half-words of code that leads to the interrupt and is not its own.
 fn foreign(image: &Image) -> HashSet<u32> {
     let functions = image.functions.iter();
     let injectors =

@@ -6,7 +6,7 @@ use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-/// Runs it with this process's own input and output; whether it succeeded.
+/// Runs it with this process's own input and output; returns whether it succeeded.
 pub fn succeeds(command: &mut Command) -> Result<bool> {
     Ok(command.status().with_context(|| cannot_start(command))?.success())
 }
@@ -29,16 +29,16 @@ pub fn say(what: &str) {
     eprintln!("xtask: {what}");
 }
 
-/// Prints what was found; good is nothing.
+/// Prints the findings; having none is good.
 pub fn is_good(findings: &[String]) -> bool {
     findings.iter().for_each(|finding| println!("{finding}"));
     findings.is_empty()
 }
 
-/// Processor time of this process and of all that it has waited for, in s; 0 where the system does not tell.
+/// Processor time of this process and of all that it has waited for, in s; 0 if the system does not report it.
 pub fn processor_s() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // Behind the name in brackets: utime, stime, cutime and cstime, in hundredths of a second.
+    // After the name in brackets: utime, stime, cutime and cstime, in hundredths of a second.
     let fields = stat.rsplit_once(") ").map_or("", |(_, fields)| fields).split(' ');
     fields.skip(11).take(4).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
 }

@@ -1,7 +1,7 @@
 //! The crates that a user takes, as a registry would get them: packed, unpacked, and checked from the packages alone.
 //!
-//! This is what `cargo publish --dry-run` does but for asking the registry, which needs a network. Cargo's own check of several packages
-//! keeps a package of the same version that it has seen before; here each takes the others from where they were just unpacked.
+//! This is what `cargo publish --dry-run` does, except for asking the registry, which needs a network. Cargo's own check of several packages keeps a
+//! package of the same version that it has seen before; here each package takes the others from where they were just unpacked.
 
 use crate::build::{cargo_with, root};
 use crate::process::succeeds;
@@ -9,13 +9,13 @@ use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The crates, each behind those that it depends on.
+/// The crates, each after those that it depends on.
 const CRATES: [&str; 3] = ["tractive-control", "tractive-tablegen", "tractive"];
 
 /// Files that every package holds.
 const OF_EACH: [&str; 3] = ["README.md", "LICENSE-APACHE", "LICENSE-MIT"];
 
-/// Files that `tractive` holds besides, for its feature `built-in`, which is not built here.
+/// Additional files of `tractive`, for its feature `built-in`, which is not built here.
 const OF_BUILT_IN: [&str; 3] =
     ["build.rs", "tables/pmasynrm-180kw/flux_map.csv", "tables/ipm-zs9/machine.toml"];
 
@@ -57,7 +57,7 @@ fn unpack(packages: &Path, name: &str) -> Result<PathBuf> {
     let archive = PathBuf::from(format!("{}.crate", folder.display()));
     let bytes = std::fs::metadata(&archive).with_context(|| archive.display().to_string())?.len();
     println!("{name}: {} kB packed", bytes / 1_000);
-    // With the present time: all files of a package have the same one, whatever they hold, and cargo looks at that.
+    // With the present time: all files in a package have the same time, whatever they contain, and cargo looks at it.
     let mut tar = Command::new("tar");
     tar.arg("-xmzf").arg(&archive).arg("-C").arg(packages);
     ensure!(succeeds(&mut tar)?, "{} is no archive", archive.display());

@@ -1,4 +1,4 @@
-//! The Python package: installed from `python/` into an environment of its own, and tested against the rig.
+//! The Python package: installed from `python/` into its own environment, and tested against the rig.
 
 use crate::build;
 use crate::process::{find, quietly, succeeds};
@@ -6,7 +6,7 @@ use crate::workspace::root;
 use anyhow::Result;
 use std::process::Command;
 
-/// Installs the package with all that its tests need, and runs them. The inner error is what is missing.
+/// Installs the package with everything that its tests need, and runs them. The inner error is what is missing.
 pub fn check() -> Result<Result<bool, String>> {
     let Some(python) = find("python3") else { return Ok(Err("there is no python3".to_owned())) };
     let environment = root().join("target/python");

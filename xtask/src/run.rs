@@ -1,6 +1,6 @@
 //! `cargo xtask run`, `talk`, `identify` and `commission`: set up, build, hand over to the rig.
 //!
-//! The rig alone reads what was typed: at first it is asked what that needs, then it is given the same words again.
+//! Only the rig reads what was typed: first it is asked what the command needs, then it is given the same arguments again.
 
 use crate::build::{self, System};
 use crate::process;
@@ -17,7 +17,7 @@ const SCRIPT: &str = "rig/scripts/round-trip.talk";
 /// The same for the ZS9.
 const ZS9_SCRIPT: &str = "rig/scripts/zs9.talk";
 
-/// The needs of the words, as the rig says.
+/// The needs of the arguments, as the rig reports them.
 #[derive(Debug, Default, Deserialize, PartialEq, Eq)]
 struct Needs {
     system: String,
@@ -32,7 +32,7 @@ struct Needs {
     emulator: bool,
     /// The script of a talk.
     script: Option<PathBuf>,
-    /// The machine folder that a commissioning makes, of which the drive's image is to be built then.
+    /// The machine folder that a commissioning makes, from which the drive's image is then built.
     tables: Option<PathBuf>,
 }
 
@@ -41,14 +41,14 @@ impl Needs {
         if self.system == "zs9" { System::Zs9 } else { System::Traction }
     }
 
-    /// The script besides the words: the shipped one, where a talk names none.
+    /// The script, apart from the arguments: the shipped one if a talk names none.
     fn script(&self, verb: &str) -> Option<PathBuf> {
         let shipped = if self.system() == System::Zs9 { ZS9_SCRIPT } else { SCRIPT };
         (verb == "talk" && self.script.is_none()).then(|| build::root().join(shipped))
     }
 }
 
-/// The rig, to be called on behalf of this program: in QEMU unless the words say otherwise.
+/// The rig, to be called on behalf of this program: in QEMU unless the arguments say otherwise.
 fn rig(program: &Path) -> Command {
     let mut rig = Command::new(program);
     rig.env("TRACTIVE_ON", "qemu").env("TRACTIVE_PROGRAM", "cargo xtask");
@@ -66,7 +66,7 @@ pub fn run(verb: &str, words: &[OsString]) -> Result<u8> {
     let mut ask = rig(&program);
     ask.args(["needs", verb]).args(words).stderr(Stdio::inherit());
     let said = ask.output().with_context(|| process::cannot_start(&ask))?;
-    // Help or bad usage: the rig has said what there is to say.
+    // Help or bad usage: the rig has already printed the message.
     let Ok(needs) = serde_json::from_slice::<Needs>(&said.stdout) else {
         print!("{}", String::from_utf8_lossy(&said.stdout));
         return Ok(code(said.status));

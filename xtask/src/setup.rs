@@ -1,4 +1,4 @@
-//! The set-up: the target, QEMU, the lints. Each step only when something is missing, each telling so.
+//! The set-up: the target, QEMU, the lints. Each step acts only when something is missing, and says so.
 
 use crate::process::{find, output_of, quietly, say};
 use crate::workspace::{TARGET, WASM, cargo, root};
@@ -9,7 +9,7 @@ use std::process::Command;
 
 /// The emulated board.
 const QEMU_MACHINE: &str = "mps2-an386";
-/// Debian's own Rust, new enough where rustup's target cannot be had.
+/// Debian's own Rust, new enough if rustup's target is not available.
 const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
@@ -98,7 +98,7 @@ impl Setup {
         }
     }
 
-    /// The browsers' target; `false` where rustup does not bring it.
+    /// The browsers' target; `false` if rustup does not provide it.
     pub fn wasm(&mut self) -> bool {
         target_is_there(WASM)
     }
@@ -112,7 +112,7 @@ impl Setup {
         found()
     }
 
-    /// The file of axe-core, which looks for what keeps people out of a page: by npm, else out of a Python package that has it inside.
+    /// The file of axe-core, which finds accessibility problems in a page: from npm, else from a Python package that contains it.
     pub fn axe(&mut self) -> Option<PathBuf> {
         const BY_NPM: &str = "axe-core@4.11.0";
         const BY_PIP: &str = "axe-playwright-python==0.1.8";
@@ -134,12 +134,12 @@ impl Setup {
         found()
     }
 
-    /// The twin's emulator: compiled, out of the Python package that has the library inside; else what it is compiled with.
+    /// The twin's emulator: compiled, from the Python package that contains the library; else what is needed to compile it.
     pub fn emulator(&mut self) -> bool {
         self.unicorn() || self.cmake()
     }
 
-    /// Unicorn's library of the very release that the twin names, where `.cargo/config.toml` has pkg-config look for it.
+    /// Unicorn's library of exactly the release that the twin names, placed where `.cargo/config.toml` makes pkg-config look for it.
     fn unicorn(&mut self) -> bool {
         let tools = root().join("target/tools/unicorn");
         let (library, told) = (tools.join("unicorn/lib/libunicorn.a"), tools.join("unicorn.pc"));
@@ -171,7 +171,7 @@ impl Setup {
         find(PROGRAM).is_some()
     }
 
-    /// mdBook, which builds the guide: the one that is there, else one built for this project alone.
+    /// mdBook, which builds the guide: the installed one, else one built for this project alone.
     pub fn mdbook(&mut self) -> Option<PathBuf> {
         const PROGRAM: &str = "mdbook";
         let tools = root().join("target/tools");
@@ -189,7 +189,7 @@ impl Setup {
     /// Slurm with its daemons, and munge.
     pub fn slurm(&mut self) -> bool {
         const PROGRAMS: [&str; 3] = ["slurmctld", "slurmd", "munged"];
-        // The daemons' folder is not on everybody's path.
+        // The daemons' folder is not on every user's path.
         let is_there = || {
             PROGRAMS.iter().all(|name| find(name).is_some() || Path::new("/usr/sbin").join(name).is_file())
         };
@@ -228,7 +228,7 @@ impl Setup {
         quietly(Command::new("rustup").args(["component", "add", component])) && usable()
     }
 
-    /// `cargo miri` of the toolchain in use, else of nightly, which it is added to.
+    /// `cargo miri` of the toolchain in use, else of nightly, to which it is added.
     pub fn miri(&mut self) -> Option<Command> {
         let nightly = || {
             let mut command = Command::new("rustup");
@@ -247,7 +247,7 @@ impl Setup {
         usable(&mut nightly()).then(nightly)
     }
 
-    /// Installs packages with apt-get where that is there and allowed; whoever calls looks whether it helped.
+    /// Installs packages with apt-get if that is available and allowed; the caller checks whether it helped.
     fn apt_install(&mut self, packages: &[&str]) {
         if find("apt-get").is_none() || !may_install() {
             return;
@@ -282,7 +282,7 @@ fn privileged(args: &[&str]) -> Command {
     command
 }
 
-/// A target's library is there, once rustup was asked for it where it was not.
+/// `true` if a target's library is there, after rustup was asked for it if it was not.
 fn target_is_there(target: &str) -> bool {
     if has_target(target) || find("rustup").is_none() {
         return has_target(target);
@@ -295,7 +295,7 @@ fn target_is_there(target: &str) -> bool {
     added
 }
 
-/// A target's library is there, whoever installed it.
+/// `true` if a target's library is there, whoever installed it.
 fn has_target(target: &str) -> bool {
     let mut rustc = Command::new("rustc");
     let folder = output_of(rustc.current_dir(root()).args(["--print", "target-libdir", "--target", target]));
@@ -326,7 +326,7 @@ fn find_linker() -> Option<PathBuf> {
     bundled.into_iter().find(|file| file.is_file()).or_else(|| find("rust-lld")).or_else(|| find("ld.lld"))
 }
 
-/// The command to type, by the package manager that is there.
+/// The command to type, for the package manager that is there.
 fn how_to_install(debian: &str, elsewhere: &str) -> String {
     let known = [
         ("apt-get", format!("sudo apt-get update && sudo apt-get install --yes {debian}")),

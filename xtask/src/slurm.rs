@@ -6,7 +6,7 @@ use crate::workspace::root;
 use anyhow::{Context, Result};
 use std::process::Command;
 
-/// The script's exit code where there is no Slurm, or no right to run it.
+/// The script's exit code if there is no Slurm, or no permission to run it.
 const CANNOT: i32 = 3;
 
 /// Runs it. The inner error is what is missing.

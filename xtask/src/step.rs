@@ -17,7 +17,7 @@ pub enum Step {
     Host,
     /// The lock-free cells under every interleaving
     Loom,
-    /// The lock-free cells in the interpreter that knows undefined behaviour
+    /// The lock-free cells in the interpreter that detects undefined behaviour
     Miri,
     /// Every target of fuzz/ for a minute or two million inputs, guided by what it reaches
     Fuzz,
@@ -25,7 +25,7 @@ pub enum Step {
     Mutants,
     /// The lock-free cells in QEMU, interrupted on every instruction
     Cells,
-    /// Interrupts slow, late and lost, in QEMU
+    /// Interrupts that are slow, late and lost, in QEMU
     Overruns,
     /// The PWM interrupt on every instruction of the control interrupt, in QEMU
     Preemption,

@@ -14,29 +14,28 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// Parts that packages are tested in: words behind `cargo test`.
+/// Parts in which packages are tested: arguments of `cargo test`.
 type Parts = &'static [&'static str];
 
-/// The packages by the commands that test them. Cargo unites the features of what it is asked for at once: with all of them in one
-/// command the rig and this program would be compiled anew, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the
-/// first.
+/// The packages by the commands that test them. Cargo unites the features of all packages in one command: with all of them at once the rig and this
+/// program would be recompiled, since `cargo rig` and `cargo xtask` ask for one package. The boards go with the first command.
 const TOGETHER: [(&str, Parts); 4] = [
     (
         "tractive tractive-control tractive-tablegen tractive-bench tractive-cells tractive-fault-injector tractive-mutants",
-        // With the optimised patterns, too, what they are for: as features they are else in the rig's dependencies alone.
+        // With the optimised patterns too, for which these tests are meant: otherwise only the rig's dependencies have these features.
         &[
             "",
             "--features tractive/optimal,tractive-tablegen/patterns --test pinned --test pulses --test patterns --test values",
             "--features tractive/optimal,tractive-tablegen/patterns --test proofs compare_values",
         ],
     ),
-    // The unit tests of that, which are only of these two.
+    // The unit tests of the same features, which only these two packages have.
     (
         ONCE_MORE,
         &["--features tractive-control/optimal,tractive-tablegen/patterns --lib -- modulation patterns"],
     ),
-    // The rig's own unit tests take a second, but all of it compiled once more: that is done without optimisation. The others take the library
-    // that `cargo rig` runs.
+    // The rig's own unit tests take a second, but need all of it compiled once more; that is done without optimisation. The others use the library that
+    // `cargo rig` runs.
     (
         "tractive-rig",
         &["--lib --config profile.release.package.tractive-rig.opt-level=0", "--bins --test *", "--doc"],
@@ -45,8 +44,8 @@ const TOGETHER: [(&str, Parts); 4] = [
 ];
 const ONCE_MORE: &str = "tractive-control tractive-tablegen";
 
-/// Settings of the C library (glibc; others do not heed them) that keep the memory that a program frees for its next use. A recording has many megabytes, and for
-/// each the system would have to make every page anew.
+/// Settings of the C library (glibc; others ignore them) that keep freed memory for the program's next use. A recording has many megabytes, and the
+/// system would otherwise have to provide every page anew for each.
 const MEMORY_KEPT: [(&str, &str); 4] = [
     ("MALLOC_ARENA_MAX", "1"),
     ("MALLOC_MMAP_THRESHOLD_", "4294967296"),
@@ -110,7 +109,7 @@ fn perform(step: Step, setup: &mut Setup) -> Result<Outcome> {
         Step::Fmt if !setup.component("fmt", "rustfmt") => return Ok(no_component("rustfmt")),
         Step::Fmt => succeeds(&mut cargo_with("fmt --all -- --check"))?,
         Step::ClippyHost if !setup.component("clippy", "clippy") => return Ok(no_component("clippy")),
-        // As released, like all that is built for this machine: macros and build scripts are then compiled once.
+        // As released, like everything built for this machine: macros and build scripts are then compiled once.
         Step::ClippyHost => {
             lint(&mut cargo(), &["--release", "--workspace", "--exclude", twin::PACKAGE, "--all-targets"])?
         }
@@ -174,7 +173,7 @@ fn host(packages: &str, parts: Parts) -> Result<bool> {
     })
 }
 
-/// The outcome of a check that may lack a tool; the inner error names it.
+/// The outcome of a check that may lack a tool; the inner error names the tool.
 fn where_possible(checked: Result<bool, String>) -> Outcome {
     checked.map_or_else(Outcome::Skipped, Outcome::from)
 }
@@ -241,7 +240,7 @@ fn qemu(setup: &mut Setup) -> Result<bool> {
     succeeds(&mut command)
 }
 
-/// The image with each machine. Behind all that takes the built-in machine, since each change of machine builds the image anew.
+/// The image with each machine. It comes after everything that takes the built-in machine, since each change of machine rebuilds the image.
 fn machines(setup: &mut Setup) -> Result<bool> {
     let toolchain = setup.toolchain()?;
     for machine in crate::run::machine_names(build::root()) {
@@ -277,7 +276,7 @@ fn lint(command: &mut Command, what: &[&str]) -> Result<bool> {
     succeeds(command.arg("clippy").args(what).args(["--", "--deny", "warnings"]))
 }
 
-/// Checks every one, also behind one that is not good.
+/// Checks every one, also after one that is not good.
 fn all<T>(of: impl IntoIterator<Item = T>, mut check: impl FnMut(T) -> Result<bool>) -> Result<bool> {
     of.into_iter().try_fold(true, |good, one| Ok(check(one)? && good))
 }
@@ -345,7 +344,7 @@ mod tests {
         let groups = together().unwrap().map(|(packages, _)| packages);
         let once = groups.iter().filter(|packages| *packages != ONCE_MORE);
         let mut tested: Vec<_> = once.flat_map(|packages| packages.split(' ')).collect();
-        // Step `twin` tests it, where there is its emulator.
+        // Step `twin` tests it, if its emulator is available.
         tested.push(twin::PACKAGE);
         there.sort_unstable();
         tested.sort_unstable();
@@ -368,7 +367,7 @@ mod tests {
     /// The rig's program, which the twin's tests do not need.
     const PROGRAM: &str = "\"tractive-rig\"";
 
-    /// A feature that a package of the tests alone asks for would have the library and all that needs it compiled twice.
+    /// A feature that only a package of the tests asks for would make the library and all that needs it compile twice.
     #[test]
     fn the_rigs_tests_and_the_twin_take_the_rig_that_runs() {
         let rig = units("build --release --package tractive-rig --bin tractive-rig");

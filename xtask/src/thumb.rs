@@ -14,9 +14,9 @@ pub type Operand = ArmOperandType;
 /// The meaning of an instruction for the flow between functions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flow {
-    /// A direct branch to this address, conditional or not, with or without a way back.
+    /// A direct branch to this address, conditional or not, with or without a return address.
     To(u32),
-    /// A branch to what a register or a memory word holds, other than a return.
+    /// A branch to the address in a register or a memory word, other than a return.
     Indirect,
     /// MOVW: the register's lower half, the upper one cleared.
     Low { register: u16, half: u16 },
@@ -33,13 +33,13 @@ pub struct Instruction {
     /// Bytes.
     pub length: u32,
     pub flow: Flow,
-    /// BL: a direct branch that keeps the way back.
+    /// BL: a direct branch that keeps the return address.
     pub links: bool,
     /// CPSID; MSR to PRIMASK, BASEPRI, BASEPRI_MAX or FAULTMASK.
     pub masks: bool,
     /// Cycles at most, without the refill where it branches.
     pub cycles: u32,
-    /// By how many bytes it moves the stack pointer.
+    /// The number of bytes by which it moves the stack pointer.
     pub stack_move: i32,
 }
 
@@ -54,7 +54,7 @@ pub fn decode(address: u32, code: &[u8]) -> Result<BTreeMap<u32, Instruction>> {
             at += decoded.len();
         }
         if at + 1 < code.len() {
-            // What is no instruction goes nowhere.
+            // Anything that is not an instruction goes nowhere.
             let length = if code[at + 1] >> 3 < 0b11101 { 2 } else { 4 };
             found.insert(address + at as u32, Instruction { length, cycles: 1, ..Instruction::default() });
             at += length as usize;
@@ -93,7 +93,7 @@ fn flow(name: &str, operands: &[Operand]) -> Flow {
     let half = |value: &i32| *value as u16;
     match (name, operands) {
         ("b" | "bl" | "cbz" | "cbnz", [.., Operand::Imm(target)]) => Flow::To(target.cast_unsigned()),
-        // By way of the link register it is a return.
+        // Through the link register it is a return.
         ("bx", [to]) | ("mov", [PC, to]) if *to != LR => Flow::Indirect,
         ("blx", _) => Flow::Indirect,
         // From the stack it is a return.

@@ -1,4 +1,4 @@
-//! `cargo xtask twin`: the board's twin, the package in `twin/`, built and run on the very image that is flashed.
+//! `cargo xtask twin`: the board's twin, the package in `twin/`, built and run on exactly the image that is flashed.
 
 use crate::board::Board;
 use crate::build::{self, System};
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// The twin's package: no default member, as it needs an emulator, and where that is not to be had compiled, cmake.
+/// The twin's package: not a default member, as it needs an emulator and, if that is not available compiled, cmake.
 pub const PACKAGE: &str = "tractive-twin";
 /// The board that it is the twin of.
 const BOARD: &str = "nucleo-g474re";
@@ -62,7 +62,7 @@ fn scripts(system: System) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// The step: lints and tests of what no other step sees, then the images through all their scenarios. The inner error is what is missing.
+/// The step: lints and tests of what no other step checks, then the images through all their scenarios. The inner error is what is missing.
 pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     if !setup.emulator() {
         return Ok(Err(no_emulator()));
@@ -79,7 +79,7 @@ pub fn check(setup: &mut Setup) -> Result<Result<bool, String>> {
     Ok(Ok(succeeds(&mut tests)?))
 }
 
-/// Drives both images through all their scenarios, as many at a time as there are cores; each tells in its turn. `true` is good.
+/// Drives both images through all their scenarios, as many at a time as there are cores; the results are printed in order. `true` is good.
 fn drive_all(images: &[PathBuf; 2]) -> Result<bool> {
     let mut drives = Vec::new();
     for (system, image) in System::ALL.into_iter().zip(images) {

@@ -27,7 +27,7 @@ const ADCAL: u32 = 1 << 31;
 /// Half cycles of sampling by SMPR's code, and of the conversion.
 const SAMPLING: [Time; 8] = [5, 13, 25, 49, 95, 185, 495, 1_281];
 const CONVERTING: Time = 25;
-/// Half cycles of a calibration, and those after it until the converter may be enabled.
+/// Half cycles of a calibration, and those that follow it before the converter may be enabled.
 const CALIBRATION: Time = 2 * 116;
 const AFTER_CALIBRATION: Time = 2 * 4;
 /// The shortest cycle of its clock, at 60 MHz (data sheet, ADC characteristics).
@@ -112,16 +112,16 @@ pub struct Adc {
     smpr: [u32; 2],
     jsqr: u32,
     results: [u32; 4],
-    /// ADC12_COMMON.CCR, or ADC345_COMMON.CCR, which several converters have.
+    /// ADC12_COMMON.CCR or ADC345_COMMON.CCR, which several converters share.
     pub common: u32,
     regulated: Time,
     calibrated: Option<Time>,
     half: Time,
     running: Option<Running>,
     pending: Option<Time>,
-    /// The timer's event of the sequence that runs.
+    /// The timer event that started the running sequence.
     triggered: Option<Time>,
-    /// The samplings so far that a timer started.
+    /// The samplings so far that were started by a timer.
     pub samplings: Vec<Sampling>,
 }
 
@@ -279,7 +279,7 @@ impl Adc {
         }
     }
 
-    /// A register is written; `false` if the twin has none such.
+    /// A register is written; `false` if the twin has no such register.
     pub fn write(
         &mut self,
         offset: u32,
@@ -344,7 +344,7 @@ impl Adc {
                 (self.pending, self.triggered) = (Some(now), None);
             }
         }
-        // What starts something is not taken back by writing 0.
+        // A bit that starts something is not cleared by writing 0.
         let kept = before & (ADEN | JADSTART | ADCAL);
         self.cr = value & (ADVREGEN | DEEPPWD | ADEN | JADSTART | ADCAL) | kept;
     }

@@ -1,9 +1,9 @@
-//! The bits of registers that the twin models in part: every other one is told of, never ignored.
+//! The modelled bits of registers that the twin models only in part: use of any other bit is reported, never ignored.
 
-/// Peripherals by the beginning of their names, offsets, and the bits that are modelled. A register that is not listed is modelled whole, or
-/// says itself what it is not.
+/// Peripherals by the beginning of their names, offsets, and the modelled bits. A register that is not listed is modelled completely, or reports itself
+/// what it does not model.
 const PARTS: [(&str, u32, u32); 24] = [
-    // Counting, preload, dead-time clock; neither one pulse nor a remapped flag.
+    // Counting, preload, dead-time clock; no one-pulse mode, no remapped flag.
     ("TIM", 0x00, 0x0000_03F5),
     // Triggers' sources, idle levels; no preloaded control bits, no combined inputs.
     ("TIM", 0x04, 0x00F5_FF70),
@@ -11,13 +11,13 @@ const PARTS: [(&str, u32, u32); 24] = [
     ("TIM", 0x08, 0x0031_0F77),
     // Interrupts; no DMA.
     ("TIM", 0x0C, 0x0000_00FF),
-    // Modes, preload, filters; neither fast enable nor clearing, no input prescaler.
+    // Modes, preload, filters; no fast enable, no clearing, no input prescaler.
     ("TIM", 0x18, 0x0101_7B7B),
     ("TIM", 0x1C, 0x0101_7B7B),
     ("TIM", 0x20, 0x0000_FFFF),
     // Every update counts.
     ("TIM", 0x30, 0),
-    // Dead time, lock, off states, the first break, without filter; the second break, automatic output and bidirectional breaks are none.
+    // Dead time, lock, off states, the first break without filter; no second break, automatic output or bidirectional breaks.
     ("TIM", 0x44, 0x0000_BFFF),
     // The index in either direction, anywhere.
     ("TIM", 0x58, 0x0000_0001),

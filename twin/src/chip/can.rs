@@ -17,7 +17,7 @@ const TXBC: u32 = 0xC0;
 const TXFQS: u32 = 0xC4;
 const TXBAR: u32 = 0xCC;
 const CKDIV: u32 = 0x100;
-/// Registers that are protected outside the configuration.
+/// Registers that are write-protected outside configuration mode.
 const PROTECTED: [u32; 4] = [NBTP, RXGFC, TXBC, CKDIV];
 const INIT: u32 = 1;
 const CCE: u32 = 1 << 1;
@@ -105,7 +105,7 @@ impl Can {
         let (listens, speaks) = (is_wired("RX"), is_wired("TX"));
         if self.sent <= now {
             self.sent = Time::MAX;
-            // Without a listener's acknowledge it is sent again and again.
+            // Without an acknowledge from a listener, the frame is sent again and again.
             if speaks
                 && self.is_on_bus()
                 && let Some(index) = self.sending.pop_front()
@@ -173,7 +173,7 @@ impl Can {
         }
     }
 
-    /// A register is written; `false` if the twin has none such.
+    /// A register is written; `false` if the twin has no such register.
     pub fn write(
         &mut self,
         offset: u32,

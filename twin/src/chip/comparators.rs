@@ -21,7 +21,7 @@ const INPUTS: [[&str; 2]; 7] = [
     ["PB11", "PD11"],
     ["PB14", "PD14"],
 ];
-/// The converter, DAC3 or DAC4, and its channel, that INMSEL = 4 gives each (RM0440, "COMP inverting input assignment").
+/// The converter, DAC3 or DAC4, and its channel, that INMSEL = 4 selects for each comparator (RM0440, "COMP inverting input assignment").
 const THRESHOLDS: [(usize, usize); 7] = [(0, 0), (0, 1), (0, 0), (0, 1), (1, 0), (1, 1), (1, 0)];
 /// DAC registers that are kept: CR, DHR12R1, DHR12R2, MCR.
 const KEPT: [u32; 4] = [0x00, 0x08, 0x14, 0x3C];
@@ -48,7 +48,7 @@ impl Comparators {
         let control = self.controls[index];
         let source = control >> 4 & 7;
         if source < 4 {
-            // The internal reference, or behind its divider a part of it.
+            // The internal reference, or the part of it behind its divider.
             let share = if control & BRGEN != 0 { f64::from(source + 1) / 4.0 } else { 1.0 };
             return (control & SCALEN != 0).then_some(INTERNAL_V * share);
         }
@@ -61,7 +61,7 @@ impl Comparators {
         enabled.then(|| f64::from(words[1 + channel] & 0xFFF) / 4_096.0 * REFERENCE_V)
     }
 
-    /// The outputs, behind their polarity, a bit each; one that is off, or without an input or a threshold, gives none.
+    /// The outputs after their polarity, a bit each; a comparator that is off, or has no input or no threshold, gives none.
     pub fn see(&mut self, gpio: &Gpio, world: &World) -> u32 {
         self.values = (0..7).fold(0, |bits, index| {
             let control = self.controls[index];
@@ -85,7 +85,7 @@ impl Comparators {
         Some(self.converters[Self::converter(name)?][register])
     }
 
-    /// A register is written; `false` if the twin has none such.
+    /// A register is written; `false` if the twin has no such register.
     pub fn write(&mut self, name: &str, offset: u32, value: u32, findings: &mut Findings) -> bool {
         if let Some(index) = Self::number(name) {
             let locked = self.controls[index] & LOCK != 0;

@@ -84,7 +84,7 @@ impl Chip {
         findings.expect(register.writable, || format!("{name} is written, and can only be read"));
         findings.expect(address & 3 == 0, || format!("{name} is written by {size} bytes at {address:#010x}"));
         let reserved = value & !register.mask;
-        // Status flags are left alone by ones, also where a bit has no name.
+        // Writing ones leaves status flags alone, also where a bit has no name.
         let flags = peripheral.starts_with("TIM") && register.offset == 0x10;
         findings.expect(reserved == 0 || flags, || {
             format!("reserved bits {reserved:#010x} of {name} are written")

@@ -17,7 +17,7 @@ const BRR: u32 = 0x28;
 /// The driver of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driver {
-    /// An input, or nothing that the twin models: the pin's own pull or what is outside.
+    /// An input, or nothing that the twin models: the pin's own pull, or whatever is outside, sets the level.
     Outside,
     /// Switched to the converters.
     Analog,
@@ -145,7 +145,7 @@ impl Gpio {
         }
     }
 
-    /// A register is written; `false` if the twin has none such.
+    /// A register is written; `false` if the twin has no such register.
     pub fn write(&mut self, port: &str, offset: u32, value: u32) -> bool {
         let words = &mut self.words[Self::port(port)];
         let output = &mut words[(ODR / 4) as usize];

@@ -129,7 +129,7 @@ impl Chip {
         self.can.act(now, &self.gpio, world);
     }
 
-    /// A timer's triggers go where they lead: to timers, by the internal trigger connection, and to converters.
+    /// Passes a timer's triggers on: to timers, by the internal trigger connection, and to converters.
     fn pass_triggers(&mut self, from: usize, now: Time) {
         let triggers = self.timers[from].take_triggers();
         let source = self.timers[from].name;
@@ -149,7 +149,7 @@ impl Chip {
         }
     }
 
-    /// The debugger halts the core: the timers that are told to stop with it do, outputs off.
+    /// The debugger halts the core: the timers that are configured to stop with it stop, with their outputs off.
     pub fn halt(&mut self, now: Time) {
         let cycle = self.rcc.cycle();
         for timer in &mut self.timers {

@@ -2,12 +2,12 @@
 
 use crate::time::Time;
 
-/// A channel's reference, and since when it has stood so.
+/// A channel's reference, and the instant since which it has had this level.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reference {
     /// Its level.
     pub high: bool,
-    /// The instant at which it became so.
+    /// The instant at which it took this level.
     pub since: Time,
 }
 
@@ -41,7 +41,7 @@ pub struct Stand {
 }
 
 impl Stand {
-    /// `true` where PWM mode 1 is active: below the compare, on the way down also at it.
+    /// `true` where PWM mode 1 is active: below the compare value and, when counting down, also at it.
     fn is_below(self, compare: u32) -> bool {
         if self.down { self.count <= compare } else { self.count < compare }
     }

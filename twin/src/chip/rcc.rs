@@ -17,16 +17,16 @@ const HSERDY: u32 = 1 << 17;
 const CSSON: u32 = 1 << 19;
 const PLLON: u32 = 1 << 24;
 const PLLRDY: u32 = 1 << 25;
-/// The flag of a reset by the independent watchdog, and RMVF, which takes the flags away.
+/// The flag of a reset by the independent watchdog, and RMVF, which clears the flags.
 pub const IWDGRSTF: u32 = 1 << 29;
 const RMVF: u32 = 1 << 23;
-/// Flags after power has come: brown-out and pin.
+/// The flags after power-up: brown-out and pin.
 pub const POWER_ON: u32 = 0b11 << 26;
 
 /// The internal oscillator and the board's crystal, in Hz.
 const HSI_HZ: u32 = 16_000_000;
 const HSE_HZ: u32 = 24_000_000;
-/// The time that the crystal takes, and the PLL.
+/// The time that the crystal takes to start, and that of the PLL.
 const HSE_STARTS: Time = 2 * MILLISECOND;
 const PLL_LOCKS: Time = 100 * MICROSECOND;
 /// The time for which the buses pass through half the frequency.
@@ -45,7 +45,7 @@ pub struct Rcc {
     pub crystal: bool,
 }
 
-/// The conditions of a fast clock: wait states of the flash memory, and a core voltage that is boosted.
+/// The conditions of a fast clock: wait states of the flash memory, and a boosted core voltage.
 #[derive(Clone, Copy, Debug)]
 pub struct Supply {
     /// Wait states.
@@ -89,7 +89,7 @@ impl Rcc {
         self.words.get(&offset).copied()
     }
 
-    /// The core's cycle, which is the timers' too: no bus is divided.
+    /// The core's cycle, which is also that of the timers: no bus clock is divided.
     pub fn cycle(&self) -> Time {
         cycle(self.core_hz)
     }
@@ -110,8 +110,8 @@ impl Rcc {
         self.word(CR) & CSSON != 0 && !self.crystal
     }
 
-    /// The crystal stops. With the clock security system the core goes on from the internal oscillator, and `true` is given: an exception
-    /// comes (RM0440, clock security system).
+    /// The crystal stops. With the clock security system the core continues on the internal oscillator, and the result is `true`: an exception follows
+    /// (RM0440, clock security system).
     pub fn lose_crystal(&mut self) -> bool {
         self.crystal = false;
         (self.crystal_ready, self.pll_ready) = (Time::MAX, Time::MAX);
@@ -152,8 +152,8 @@ impl Rcc {
         *self.words.entry(offset).or_default() |= bits;
     }
 
-    /// A register is written; `false` if the twin has none such. The flash memory's wait states and the core voltage are looked at when
-    /// the core becomes faster.
+    /// A register is written; `false` if the twin has no such register. The flash memory's wait states and the core voltage are checked when the core becomes
+    /// faster.
     pub fn write(
         &mut self,
         offset: u32,
@@ -248,7 +248,7 @@ impl Rcc {
     }
 }
 
-/// Wait states in range 1: one for each 30 MHz without boost, for each 34 MHz with it; beyond 150 MHz only with it (RM0440, 3.3.3, 6.1.5).
+/// Wait states in range 1: one per 30 MHz without boost, one per 34 MHz with it; above 150 MHz only with it (RM0440, 3.3.3, 6.1.5).
 fn check_speed(hz: u32, Supply { latency, boosted }: Supply, findings: &mut Findings) {
     let step_hz = if boosted { 34_000_000 } else { 30_000_000 };
     findings.expect(boosted || hz <= 150_000_000, || {

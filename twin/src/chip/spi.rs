@@ -12,7 +12,7 @@ const SR: u32 = 0x08;
 const DR: u32 = 0x0C;
 const MSTR: u32 = 1 << 2;
 const SPE: u32 = 1 << 6;
-/// SSM and SSI: without both a master loses its mastery to its own select pin.
+/// SSM and SSI: without both, a master loses its master mode to its own select pin.
 const SELECTED: u32 = 0b11 << 8;
 /// Words that each FIFO holds.
 const WORDS: usize = 2;
@@ -45,7 +45,7 @@ impl Spi {
         (BITS * cycle) << ((self.control[0] >> 3 & 7) + 1)
     }
 
-    /// Does what is due. A word without a wire is none but zeros.
+    /// Does what is due. Without a wire, a word is all zeros.
     pub fn act(&mut self, now: Time, cycle: Time, gpio: &Gpio, world: &mut World) {
         if self.ends.is_none_or(|at| at > now) {
             return;
@@ -76,7 +76,7 @@ impl Spi {
         }
     }
 
-    /// A register is written; `false` if the twin has none such.
+    /// A register is written; `false` if the twin has no such register.
     pub fn write(
         &mut self,
         offset: u32,

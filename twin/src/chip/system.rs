@@ -48,7 +48,7 @@ impl System {
         Self::key(name, offset).and_then(|key| self.words.get(&key).copied())
     }
 
-    /// A register is written; `false` if the twin has none such.
+    /// A register is written; `false` if the twin has no such register.
     pub fn write(&mut self, name: &str, offset: u32, value: u32, findings: &mut Findings) -> bool {
         let Some(key) = Self::key(name, offset) else { return false };
         if name == "SYSCFG" {
@@ -92,7 +92,7 @@ impl System {
         Supply { latency: self.word("FLASH", 0) & 0xF, boosted: self.word("PWR", 0x80) & 1 << 8 == 0 }
     }
 
-    /// `true` while the chip itself breaks its timers: the crystal has stopped, or the supply is low where that is connected.
+    /// `true` while the chip itself activates its timers' break: the crystal has stopped, or the supply is low and that is connected.
     pub fn breaks(&self, rcc: &Rcc) -> bool {
         let watched = self.word("PWR", 0x04) & 1 != 0 && self.word("SYSCFG", 0x1C) & 1 << 2 != 0;
         rcc.has_failed() || (watched && self.low_supply)

@@ -57,7 +57,7 @@ impl Watchdog {
         }
     }
 
-    /// A register is written; `false` if the twin has none such.
+    /// A register is written; `false` if the twin has no such register.
     pub fn write(&mut self, offset: u32, value: u32, now: Time, findings: &mut Findings) -> bool {
         match (offset, value) {
             (0x00, 0x5555) => self.unlocked = true,

@@ -1,5 +1,5 @@
-//! The cycles of a basic block, by the Cortex-M4's documented timings: an upper bound, as no load is pipelined and every refill takes
-//! three cycles. Whether a conditional branch is taken is not known before: a block's last instruction is counted as taken.
+//! The cycles of a basic block, by the Cortex-M4's documented timings: an upper bound, since no load is taken as pipelined and every refill takes three
+//! cycles. Whether a conditional branch will be taken is not known beforehand: a block's last instruction is counted as taken.
 
 /// Cycles that the pipeline's refill takes after a branch.
 const REFILL: u32 = 3;
@@ -17,14 +17,14 @@ pub const WAIT_STATES: u32 = 4;
 pub struct Cost {
     /// Its instructions, fetched without a wait.
     pub cycles: u32,
-    /// The waits that its fetches add with no cache and no prefetch: each of the flash memory's lines that it lies in takes the wait states
-    /// once (RM0440, 3.3.4; two banks, lines of 64 bits).
+    /// The waits that its fetches add without cache and prefetch: each of the flash memory's lines that the block touches costs the wait states once
+    /// (RM0440, 3.3.4; two banks, lines of 64 bits).
     pub waits: u32,
-    /// Those with the prefetch alone: the next line is fetched while one is executed, so only the first line, to which the program has come by a
-    /// branch, takes all of them.
+    /// The waits with the prefetch alone: the next line is fetched while one is executed, so only the first line, which the program has reached by a
+    /// branch, costs all of them.
     pub prefetched: u32,
-    /// The cycles of either that it does not take where the block before leads on to it without a branch: its pipeline's refill, and the first line's
-    /// wait unless it begins one.
+    /// The cycles that are saved, with or without prefetch, where the preceding block runs on into this one without a branch: its pipeline's refill,
+    /// and the first line's wait unless the block begins a line.
     pub led_on: u32,
 }
 
@@ -50,7 +50,7 @@ pub fn of(at: usize, code: &[u8]) -> Cost {
         let wide = first >> 11 >= 0b11101;
         let second = if wide { halves.get(place + 1).copied().unwrap_or(0) } else { 0 };
         let cycles = if wide { wide_cycles(*first, second) } else { narrow_cycles(*first) };
-        // The instruction is there with its last half.
+        // The instruction is complete with its last half.
         let ends = (at + 2 * place + if wide { 2 } else { 0 }) / LINE;
         if line.replace(ends).is_none_or(|before| before != ends) {
             let first = cost.prefetched == 0;
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn a_line_waits_for_what_the_one_before_leaves() {
         let nops = |count: usize| [0x00, 0xBF].repeat(count);
-        // Four instructions a line, of a cycle each: the next line comes a cycle later than they are done.
+        // Four one-cycle instructions a line: the next line arrives a cycle after they are done.
         assert_eq!(of(0, &nops(4)), Cost { cycles: 6, waits: 4, prefetched: 4, led_on: 2 });
         assert_eq!(of(0, &nops(12)), Cost { cycles: 14, waits: 12, prefetched: 4 + 1 + 1, led_on: 2 });
         assert_eq!(unwaited(&nops(12)), Cost { cycles: 14, waits: 0, prefetched: 0, led_on: 2 });

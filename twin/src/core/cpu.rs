@@ -37,12 +37,12 @@ const NO_FLOAT: u32 = 1 << 4;
 const IT_STATE: u32 = 0x0600_FC00;
 /// The memory's content before the program writes.
 const PAINT: u8 = 0xA5;
-/// Cycles between two looks while the core stands still.
+/// Cycles from one look to the next while the core stands still.
 const STALL_CYCLES: u32 = 17;
 /// The flag of a reset by the pin, which every reset drives.
 const PIN_RESET: u32 = 1 << 26;
-/// CONTROL.FPCA, and the bit beside it, SFPA of ARMv8-M: the emulator takes the core to be in its secure state, and without that bit makes a
-/// new floating-point context, FPSCR and its flags anew, at the next floating-point instruction.
+/// CONTROL.FPCA, and the bit beside it, SFPA of ARMv8-M: the emulator takes the core to be in its secure state, and without that bit creates a new
+/// floating-point context, with new FPSCR and flags, at the next floating-point instruction.
 const FLOAT_CONTEXT: u32 = 0b11 << 2;
 /// Words of a frame, and of the floating-point registers in it.
 const FRAME: u32 = 8;
@@ -71,8 +71,8 @@ pub enum Stop {
 pub struct Longest {
     /// With no wait for the flash memory.
     pub cycles: u64,
-    /// With the prefetch alone, and every wait state of the words of tables and literals; branches by whether they were taken. 0 unless
-    /// waits are counted.
+    /// With the prefetch alone, and with every wait state for the words of tables and literals; a branch counts by whether it was taken. 0 unless waits
+    /// are counted.
     pub prefetched: u64,
     /// With every wait state; 0 unless waits are counted.
     pub waited: u64,
@@ -153,7 +153,7 @@ impl Cpu {
         self.jump(entry)
     }
 
-    /// From now on a finding's place is its very instruction, not the beginning of its block. That takes the emulator longer.
+    /// From now on a finding's place is the exact instruction, not the beginning of its block. This makes the emulator slower.
     pub fn trace(&mut self) -> Result<()> {
         self.engine
             .add_code_hook(1, 0, |engine, address, _| engine.get_data_mut().findings.now.1 = address as u32)
@@ -161,7 +161,7 @@ impl Cpu {
         self.engine.ctl_flush_tb().map_err(failed)
     }
 
-    /// From now on the waits for the flash memory are counted. That takes the emulator a quarter longer.
+    /// From now on the waits for the flash memory are counted. This makes the emulator take a quarter longer.
     pub fn count_waits(&mut self) -> Result<()> {
         self.machine_mut().waits = Some(Waits::default());
         hook_loads(&mut self.engine).and_then(|()| self.engine.ctl_flush_tb()).map_err(failed)
@@ -177,8 +177,8 @@ impl Cpu {
         self.engine.ctl_flush_tb().map_err(failed)
     }
 
-    /// Once all of the CCM SRAM is protected nothing needs to tell of writes: with such a hook the emulator looks for one at each access of any memory, which
-    /// takes a third longer.
+    /// Once all of the CCM SRAM is protected, nothing needs to report writes: with such a hook the emulator looks for it at each access of any memory,
+    /// which takes a third longer.
     fn close_code(&mut self) -> Result<()> {
         if !self.machine().chip.system.is_all_protected() {
             return Ok(());
@@ -198,12 +198,12 @@ impl Cpu {
         self.begin()
     }
 
-    /// The bytes between what has a place of its own, which ends here, and the end of RAM.
+    /// The bytes between the end of the static data, which is given, and the end of RAM.
     pub fn stack_room(&self, statics_end: u32) -> u32 {
         self.start.0 - statics_end
     }
 
-    /// The bytes of the stack that have been written at any time, above the end of what has a place of its own.
+    /// The bytes of the stack that have been written at any time, above the end of the static data.
     pub fn stack_bytes(&self, statics_end: u32) -> Result<u32> {
         let top = self.start.0;
         let bytes =
@@ -294,11 +294,11 @@ impl Cpu {
     }
 
     fn enter(&mut self, exception: usize) -> Result<()> {
-        // The emulator's own word for it, CONTROL.FPCA, stays behind where a block goes on after a return: what is saved is never too little.
+        // The emulator's own flag for this, CONTROL.FPCA, lags behind where a block goes on after a return: what is saved is never too little.
         let floats = self.machine().nvic.has_fpu();
         let (sp, xpsr) = (self.get(R::SP)?, self.get(R::XPSR)?);
         let words = FRAME + if floats { FLOATS } else { 0 };
-        // Aligned to eight bytes; bit 9 of the stacked word says whether that took one.
+        // Aligned to eight bytes; bit 9 of the stacked word says whether the alignment took a word.
         let frame = (sp - 4 * words) & !7;
         let odd = u32::from(sp & 4 != 0) << 9;
         let mut stack = Vec::new();
@@ -430,13 +430,13 @@ fn hook(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
         } else {
             machine.findings.add(format!("{kind:?} of {size} bytes at {address:#010x}, where nothing is"));
         }
-        // Such a write comes to nothing, and the program goes on.
+        // Such a write has no effect, and the program continues.
         is_code
     })?;
     Ok(())
 }
 
-/// The emulator tells of loads from where they have to wait.
+/// The emulator reports loads from memory that makes them wait.
 fn hook_loads(engine: &mut Unicorn<'static, Machine>) -> Result<(), uc_error> {
     // Tables and literals: each word takes every wait state, as without the data cache. A literal beside the code in the CCM SRAM: the fetch of the same
     // cycle waits for it.

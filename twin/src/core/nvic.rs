@@ -25,7 +25,7 @@ pub struct Nvic {
     /// The lines' own levels: an interrupt whose line is still high when its handler returns comes again.
     lines: [bool; LINES],
     priorities: [u8; LINES],
-    /// The instants since which they could come, and the longest that each has waited from then on.
+    /// The instants from which each could have been taken, and the longest time that each has waited since then.
     since: [Time; LINES],
     waited: [Time; LINES],
     /// The processor's own exceptions that are pending: the non-maskable interrupt, the hard fault.

@@ -100,7 +100,7 @@ fn writes(of: &[(u32, u32)]) -> Vec<u32> {
     let literals = 2 * of.len() as u32 + 1;
     let mut words = Vec::new();
     for index in 0..of.len() as u32 {
-        // A literal's offset counts from the instruction's word on, and a word further.
+        // A literal's offset counts from the word behind the instruction's own word.
         let to_literal = |place: u32, instruction: u32| literals + place - (instruction + 1);
         let load = |register: u32, words: u32| 0x4800 | register << 8 | words;
         let (address, value) = (to_literal(2 * index, 2 * index), to_literal(2 * index + 1, 2 * index));
@@ -120,7 +120,7 @@ fn before(of: &[(u32, u32)]) -> Cpu {
     Cpu::new(&Image::of(&words), machine(&settings).unwrap()).unwrap()
 }
 
-/// The first offence of a program that writes these words, told; `traced` by its instruction.
+/// The report on the first offence of a program that writes these words; `traced`: located by its instruction.
 fn offence(of: &[(u32, u32)], traced: bool) -> Finding {
     let mut cpu = before(of);
     if traced {
@@ -171,7 +171,7 @@ fn an_offence_is_told_with_its_address_and_its_place_in_the_program() {
         (&[(0x4000_5FFC, 0)], "0x40005ffc is written, where the chip has no register"),
         (&[ENABLE_APB2, (0x4001_2C00, 1 << 15)], "reserved bits 0x00008000 of TIM1.CR1 are written"),
         (&[(0x4800_0010, 1)], "GPIOA.IDR is written"),
-        // Code that is protected, and cannot be otherwise any more.
+        // Code that is protected, and whose protection cannot be lifted any more.
         (
             &[ENABLE_SYSCFG, (0x4001_0020, 2), (CCM.0, 1), (CCM.0 + 0x400, 1)],
             "a write to the CCM SRAM's page 1, which is protected",
@@ -192,7 +192,7 @@ fn an_offence_is_told_with_its_address_and_its_place_in_the_program() {
         assert!(text.contains(&format!("block {:#010x}", 0x0800_0000 + PROGRAM)), "{text}");
         let (address, _) = of[of.len() - 1];
         assert!(text.contains(&format!("{address:#010x}")), "{text}");
-        // Of eight bytes a write, the store is the third instruction.
+        // Each write takes eight bytes; the store is its third instruction.
         let store = PROGRAM + 8 * (of.len() as u32 - 1) + 4;
         assert_eq!(offence(of, true).pc, 0x0800_0000 + store, "{text}");
     }

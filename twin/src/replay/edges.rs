@@ -1,4 +1,4 @@
-//! The edges that the host's pulses put on the gates' pins, and how far those that were there are off them.
+//! The edges that the host's pulses put on the gates' pins, and how far the edges that were there deviate from them.
 
 use crate::time::Time;
 use crate::world::Edge;
@@ -34,7 +34,7 @@ pub struct Compared {
     pub first: Option<(usize, Time)>,
 }
 
-/// A time in which all edges are the pulses'.
+/// An interval in which all edges come from the pulses.
 pub struct Span {
     /// Its beginning.
     pub from: Time,
@@ -44,7 +44,7 @@ pub struct Span {
     pub edges: Vec<Edge>,
 }
 
-/// Compares with so many gates; two edges are the same if a tick at most is between them.
+/// Compares for so many gates; two edges are the same if at most a tick lies between them.
 pub fn compare(spans: &[Span], pins: &[Edge], gates: usize, tick: Time, ended: Time) -> Compared {
     let mut outcome = Compared { all: pins.len(), ..Compared::default() };
     for span in spans {

@@ -28,9 +28,9 @@ const DIR: u32 = 1 << 4;
 pub struct Given {
     /// Control's interrupt, not the PWM's.
     pub control: bool,
-    /// Of the PWM's: it came for a boundary, by its first look at the timer's flag; of the ZS9 for a peak, by the counter's direction.
+    /// In the PWM's interrupt: it came for a boundary, by its first look at the timer's flag; on the ZS9 for a peak, by the counter's direction.
     pub boundary: Option<bool>,
-    /// Of control's: it had the PWM's come for a revision, which is not among those that are given.
+    /// In control's interrupt: it made the PWM's come for a revision, which is not among those that are given.
     pub revised: bool,
     /// The conversions of ADC1, ADC2 and ADC3, in their order.
     pub codes: [[u32; 4]; 3],

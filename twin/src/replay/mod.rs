@@ -1,6 +1,6 @@
-//! The host's edges of the same inputs: the drive's tasks, run on the host with the conversions, counts and flags that the image's interrupts
-//! read and with the commands that its idle loop left in the mailbox, make the pulses that the host would play; the edges at the gates' pins
-//! are held against them.
+//! The host's edges from the same inputs: the drive's tasks run on the host with the conversions, counts and flags that the image's interrupts read and
+//! with the commands that its idle loop left in the mailbox, and make the pulses that the host would play. The edges at the gates' pins are compared
+//! with these.
 
 pub mod edges;
 mod given;

@@ -156,7 +156,7 @@ impl Tasks for Host {
         }
     }
 
-    /// The edges of each half with pulses: where a leg turns, the device that goes off does so at once, the other one goes on the dead time later.
+    /// The edges of each half with pulses: where a leg switches, one device turns off at once, and the other one turns on after the dead time.
     fn spans(&self, scale: &Scale) -> Vec<Span> {
         let tick = scale.cycle * Time::from(self.tick_cycles);
         let mut spans: Vec<Span> = Vec::new();

@@ -150,7 +150,7 @@ impl Tasks for Host {
         }
     }
 
-    /// A device that goes off does so at once; one that goes on does so the dead time later, and not at all where it is to go off by then.
+    /// A device turns off at once; it turns on after the dead time, and not at all if it is to turn off by then.
     fn spans(&self, scale: &Scale) -> Vec<Span> {
         let Some((first, _)) = self.periods.first() else { return Vec::new() };
         let at = |ticks: u32, cycles: u32| {
@@ -214,8 +214,8 @@ impl Pulse {
     }
 }
 
-/// The pauses of a leg's devices H, M and L in the rising half, in cycles from its beginning: to the nearest cycle, one at least. A piece of
-/// shoot-through that the dead time would take whole is left out.
+/// The pauses of a leg's devices H, M and L in the rising half, in cycles from its beginning: to the nearest cycle, one at least. A shoot-through
+/// section that the dead time would take up completely is left out.
 fn pauses([high, middle, low]: [&GateTicks; 3], dead: u32) -> [(u32, u32); 3] {
     let nearest = |steps: u32| ((steps * TICK_CYCLES + COMPARE_STEPS / 2) / COMPARE_STEPS).min(HALF);
     let is_pause = |gate: &GateTicks| gate.off_from < gate.off_to;

@@ -22,8 +22,8 @@ use wiring::{BUS, Sensor, Wiring};
 /// The times in which a contactor closes and opens.
 const CLOSES: Time = 40 * MILLISECOND;
 const OPENS: Time = 20 * MILLISECOND;
-/// The rotor is pushed a little forwards, then back over its index while the board counts already, and let go of: until when, and at what
-/// speed in r/min.
+/// The push of the rotor, a little forwards, then back over its index while the board is already counting, before it is released: until when, and at
+/// what speed in r/min.
 const PUSHES: [(Time, f64); 3] = [(60 * MILLISECOND, 10.0), (150 * MILLISECOND, -10.0), (Time::MAX, 0.0)];
 const PUSH_RPM_S: f64 = 1e6;
 /// The time for which the drivers' ready wire drops.
@@ -90,7 +90,7 @@ pub struct World {
     pub line_edges: Vec<Edge>,
     /// The drivers are ready.
     pub ready: bool,
-    /// Current that flows in a phase besides, in A: past the motor, as to earth. The motor, the phase.
+    /// Additional current in a phase, in A, that bypasses the motor, such as to earth. The motor, the phase.
     pub excess_a: (usize, usize, f64),
     /// The instant at which the drivers' ready wire drops for 10 ms.
     pub drops: Option<Time>,
@@ -304,8 +304,8 @@ impl World {
         }
     }
 
-    /// Looks at the gates' pins. A device may still conduct within the dead time after its gate went off; a leg is not shorted by such
-    /// devices, and by commanded ones alone only where the inverter is made for it.
+    /// Looks at the gates' pins. A device may still conduct within the dead time after its gate went off. Such devices must not short a leg; commanded
+    /// ones alone may, only where the inverter is made for it.
     pub fn see_gates(&mut self, now: Time, chip: &Chip, findings: &mut Findings) {
         let dead = Time::from(self.stage.dead_time_ns) * MICROSECOND / 1_000;
         let before = self.gates.clone();

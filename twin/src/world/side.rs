@@ -48,7 +48,7 @@ pub struct Zs9 {
     pub seen: GateFeedback,
     /// Loads, in N·m.
     pub loads_nm: [f64; 2],
-    /// Time with a leg shorted, and all, in the present row.
+    /// Time with a leg shorted, and total time, in the present row.
     shorted_s: (f64, f64),
     /// The trace.
     pub rows: Vec<zs9::trace::Row>,

@@ -5,12 +5,12 @@ use crate::elf::Image;
 use crate::fault_injector::Seen;
 use std::collections::{BTreeMap, HashSet};
 
-/// A control interrupt samples at once. One that has not begun a sixteenth of its period after its timer counts as lost, so no delay puts
-/// a boundary before the samples that comes later than this part of the period, a little less.
+/// A control interrupt samples at once. If it has not begun a sixteenth of its period after its timer, it counts as lost. So no delay brings a boundary
+/// before the samples if the boundary comes later than this part of the period, which is a little less.
 const BEGUN_PART: u32 = 18;
-/// By how many instructions a landing may be off the ticks that are left.
+/// The number of instructions by which a landing may deviate from the ticks that are left.
 pub const NEAR: u32 = 2 * INSTRUCTIONS_PER_TICK;
-/// The most instructions of the PWM interrupts within a control interrupt, with their link, and a little for control's own way.
+/// The most instructions of the PWM interrupts within a control interrupt, with their link, and a little for control's own entry.
 const ALLOWANCE: u32 = 6_000;
 
 /// A control interrupt of a run, between its boundaries.
@@ -23,9 +23,9 @@ pub struct Stand<'a> {
     pub left_ticks: u32,
     /// Since the last one; `None` before the first.
     pub since_ticks: Option<u32>,
-    /// By how many instructions it may begin later and still end in time.
+    /// The number of instructions by which it may begin later and still end in time.
     pub most: u32,
-    /// Instructions that it has executed when the boundary comes, if it does not wait; not known before one has landed in it.
+    /// Instructions that it has executed when the boundary comes, if it does not wait; unknown before one has landed in it.
     pub boundary: Option<u32>,
 }
 
@@ -85,7 +85,7 @@ impl<'a> Stand<'a> {
         seen.iter().filter_map(stand).collect()
     }
 
-    /// The reason why no boundary can come here, so many instructions behind its beginning.
+    /// The reason why no boundary can come at the point this many instructions after its beginning.
     pub fn why(&self, before: u32) -> Option<Why> {
         let far = self.left_ticks > self.control_ticks;
         if before > self.left_ticks * INSTRUCTIONS_PER_TICK + NEAR {
@@ -109,7 +109,7 @@ pub struct Reached {
     /// Of each mode the instructions that were executed, and those that were hit.
     all: BTreeMap<String, HashSet<u32>>,
     hit: BTreeMap<String, HashSet<u32>>,
-    /// The reason why no boundary can come at an instruction, in each control interrupt that executes it; `None` where in some one could.
+    /// The reason why no boundary can come at an instruction, in each control interrupt that executes it; `None` if one could in some of them.
     whys: BTreeMap<u32, Option<Why>>,
     pub preemption: usize,
     pub passes: usize,
@@ -142,7 +142,7 @@ impl Reached {
         }
     }
 
-    /// Executed and hit, by mode, and those that no boundary can come at.
+    /// Instructions executed and hit, by mode, and those that no boundary can reach.
     pub fn table(&self) -> String {
         let hit = self.hit_in_any();
         let counts = self.all.iter().map(|(mode, all)| {

@@ -1,17 +1,17 @@
-//! By how many instructions each control interrupt is to begin later.
+//! The number of instructions by which each control interrupt is to begin later.
 
 use super::INSTRUCTIONS_PER_TICK;
 use super::reach::{NEAR, Reached, Stand};
 use crate::fault_injector::Seen;
 use std::collections::{HashMap, HashSet};
 
-/// The wanted instruction: whether it was hit in another mode; mode and instruction.
+/// The wanted instruction: whether it was hit in another mode; mode and address.
 type Wanted<'a> = (bool, &'a str, u32);
 
 /// The control interrupts of a run, and what is known of them.
 pub struct Search<'a> {
     pub stands: Vec<Stand<'a>>,
-    /// From the ticks that are left, in instructions, to [`Stand::boundary`]: the same for all that begin as their timer comes.
+    /// Offset from the ticks that are left, in instructions, to [`Stand::boundary`]: the same for all that begin when their timer fires.
     usual: u32,
 }
 
@@ -33,8 +33,8 @@ impl<'a> Search<'a> {
         u16::try_from(delay).ok()
     }
 
-    /// By how many instructions each control interrupt is to begin later in the next passes: first those instructions that were hit in
-    /// no mode, of them those first that the fewest reach. `None`: there is nothing that was hit in no mode.
+    /// The number of instructions by which each control interrupt is to begin later in the next passes. Instructions that were hit in no mode come
+    /// first, and among them those that the fewest reach. `None`: no instruction is left that was hit in no mode.
     pub fn delays(&self, calls: usize, passes: usize, reached: &Reached) -> Option<Vec<Vec<u16>>> {
         let hit = reached.hit_in_any();
         let mut ways: HashMap<Wanted, Vec<(usize, u16)>> = HashMap::new();
@@ -67,7 +67,7 @@ impl<'a> Search<'a> {
         Some(delays)
     }
 
-    /// Takes what came of it.
+    /// Takes in the outcome.
     pub fn take(&mut self, delays: &[u16], seen: &[Seen], reached: &mut Reached) {
         let landed: HashMap<usize, u32> =
             seen.iter().filter_map(|seen| Some((seen.number, seen.landed?))).collect();
@@ -103,7 +103,7 @@ mod tests {
         Call { mode: "async".to_owned(), path, sampled: 35 }
     }
 
-    /// The image's account if it lands where the boundary, this many instructions behind the beginning, comes.
+    /// The image's account if the interrupt lands where the boundary comes, this many instructions after the beginning.
     fn landed(call: &Call, left_ticks: u32, boundary: u32, delay: u16) -> Seen {
         let before = boundary - u32::from(delay);
         let landed = call.path.iter().find(|(_, at)| *at == before).map(|(address, _)| *address);
@@ -133,7 +133,7 @@ mod tests {
         let seen = [Seen { number: 0, left_ticks: 100, landed: None }];
         reached.judge(&Search::new(Stand::all(&calls, &seen, 2_500, 2_500)).stands);
         assert_eq!(reached.missing().count(), 10);
-        // Just behind a boundary nothing can be.
+        // Just after a boundary nothing can be hit.
         let calls = [call(), call()];
         let seen = [(0, 100), (1, 12_000)];
         let seen = seen.map(|(number, left_ticks)| Seen { number, left_ticks, landed: None });

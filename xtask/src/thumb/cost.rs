@@ -1,8 +1,8 @@
 //! The cost of an instruction on a Cortex-M4F, in cycles and in stack.
 //!
-//! The cycles are those of the processor's technical reference manual (instruction timings, chapters 3 and 7), each at its
-//! worst: memory without wait states, no load pipelined behind another, three cycles to refill the pipeline after every
-//! branch that is taken, and every result of the floating-point unit wanted by the very next instruction.
+//! The cycles are those of the processor's technical reference manual (instruction timings, chapters 3 and 7), each at its worst: memory without wait
+//! states, no load pipelined behind another, three cycles to refill the pipeline after every taken branch, and every result of the floating-point unit
+//! needed by the very next instruction.
 
 use super::{Operand, SP};
 use capstone::RegId;
@@ -10,7 +10,7 @@ use capstone::arch::arm::ArmReg;
 
 /// To refill the pipeline.
 pub const REFILL: u32 = 3;
-/// Into a handler and out of it again, and for the floating-point registers that its first such instruction stacks.
+/// Cycles into a handler and out of it again, and for the floating-point registers that its first such instruction stacks.
 pub const ENTRY_AND_RETURN: u32 = 12 + 12 + 18;
 /// Bytes that an interrupt stacks: eight words, eighteen for the floating-point unit, one to align.
 pub const EXCEPTION_FRAME: i32 = 4 * (8 + 18 + 1);
@@ -51,7 +51,7 @@ fn float(name: &str, operands: &[Operand]) -> u32 {
     }
 }
 
-/// By how many bytes it moves the stack pointer.
+/// The number of bytes by which it moves the stack pointer.
 pub fn stack_move(name: &str, operands: &[Operand], writes_back: bool) -> i32 {
     match (name, operands) {
         ("push" | "vpush", _) => -4 * words(operands).cast_signed(),

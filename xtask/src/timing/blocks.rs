@@ -15,12 +15,12 @@ use std::path::Path;
 pub struct Block {
     /// Its work and its maker, as `sqrt/libm`.
     pub name: String,
-    /// Instructions on the dearest input.
+    /// Instructions for the most expensive input.
     pub max: u32,
     pub mean: f64,
     /// Cycles that they take at most.
     pub cycles: u32,
-    /// Largest absolute error; nothing where there is nothing to compare with.
+    /// Largest absolute error; `None` if there is nothing to compare with.
     pub max_error: Option<f64>,
 }
 
@@ -60,7 +60,7 @@ fn counts(image: &Image, executed: &[u32]) -> BTreeMap<String, Vec<Count>> {
     });
     let blocks: BTreeMap<u32, String> = named.collect();
     let mut counts = BTreeMap::<String, Vec<Count>>::new();
-    // Where the running block returns to, and how far it is.
+    // The running block's return address, and its progress.
     let mut running: Option<(&String, u32, Count)> = None;
     let mut last = 0;
     for &address in executed {

@@ -1,4 +1,4 @@
-//! The budgets of `budgets.toml`, and how the measured values keep them.
+//! The budgets of `budgets.toml`, and whether the measured values keep within them.
 
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
@@ -13,13 +13,13 @@ pub struct Judged {
 }
 
 impl Judged {
-    /// `true` for a value within its budget; one that is no number is not.
+    /// `true` for a value within its budget; a NaN is not.
     pub fn kept(&self) -> bool {
         self.value <= self.budget
     }
 }
 
-/// Judges the values by the file's text: each has to have a budget, each budget a value.
+/// Judges the values by the file's text: each value must have a budget, each budget a value.
 pub fn judge(text: &str, values: &[(impl AsRef<str>, f64)]) -> Result<Vec<Judged>> {
     let groups: BTreeMap<String, BTreeMap<String, f64>> = toml::from_str(text).context("budgets.toml")?;
     let mut budgets = BTreeMap::new();

@@ -15,21 +15,21 @@ use std::time::Duration;
 
 /// Modules whose functions are the link to the rig.
 const LINK: [&str; 2] = ["tractive::board::qemu::exchange::", "tractive::wire::"];
-/// Ends of the names of what the idle loop runs through all the time.
+/// Ends of the names of functions that the idle loop runs all the time.
 const IDLE: [&str; 2] = ["main", "board::qemu::idle"];
 /// Ends the log when the emulator has.
 const END: &[u8] = b"end of the log";
 
-/// Everything that it takes to drive.
+/// Everything that is needed to drive.
 #[derive(Clone)]
 pub struct Bench {
     pub rig: PathBuf,
     pub qemu: PathBuf,
-    /// The rig's command: its scenario, or whom it talks to.
+    /// The rig's command: its scenario, or its partner in the talk.
     pub command: Vec<String>,
     pub path: PathBuf,
     pub image: Image,
-    /// `true` if what each interrupt executed is wanted.
+    /// `true` if the instructions that each interrupt executed are wanted.
     pub keeps_paths: bool,
 }
 
@@ -54,18 +54,18 @@ pub struct Drive {
 pub struct Served {
     pub interrupt: String,
     pub mode: String,
-    /// `None` where the mode says it, and without pulses.
+    /// `None` if the mode implies it, and without pulses.
     pub direction: Option<&'static str>,
     /// Stator frequency; 0 where it is not told.
     pub hertz: f64,
 }
 
-/// The directions of the mechanical power, as the rig and the tables call them: the sign of torque by speed. Where it is nothing it is
-/// the direction before.
+/// The directions of the mechanical power, as the rig and the tables call them: the sign of torque times speed. If the power is zero, the previous
+/// direction holds.
 pub const DIRECTIONS: [&str; 2] = ["motoring", "braking"];
 
 impl Bench {
-    /// Of an image and the words of the rig's command; what each interrupt executed is not wanted.
+    /// For an image and the arguments of the rig's command; the instructions that each interrupt executed are not wanted.
     pub fn of(rig: &Path, qemu: &Path, command: &[&str], path: PathBuf) -> Result<Self> {
         let (rig, qemu, image) = (rig.to_owned(), qemu.to_owned(), image::read(&path)?);
         let command = command.iter().map(|word| (*word).to_owned()).collect();
@@ -106,7 +106,7 @@ impl Bench {
         Ok(Drive { served: read_served(&text)?, ..drive? })
     }
 
-    /// Reads to the end whatever happens, so that nobody waits for a reader.
+    /// Reads to the end whatever happens, so that no writer waits for a reader.
     fn follow(&self, log: File) -> Result<Drive> {
         let link = self.image.functions.iter();
         let link: BTreeSet<u32> =
@@ -165,7 +165,7 @@ fn fifo(path: &Path) -> Result<(File, File)> {
     mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)
         .with_context(|| format!("cannot make the FIFO {}", path.display()))?;
     let both = OpenOptions::new().read(true).write(true).open(path)?;
-    // As much as the system allows without privileges; a smaller one only takes longer.
+    // As large as the system allows without privileges; a smaller one only takes longer.
     let _ = rustix::pipe::fcntl_setpipe_size(&both, 1 << 20);
     let writer = both.try_clone()?;
     Ok((both, writer))

@@ -1,4 +1,4 @@
-//! The obstacles to an interrupt's entry: instructions that mask it, and the one under way.
+//! The obstacles to an interrupt's entry: instructions that mask it, and the instruction in progress.
 
 use super::tally::Tally;
 use crate::elf::Image;
@@ -11,7 +11,7 @@ pub fn masking(image: &Image, is_link: impl Fn(&[String]) -> bool) -> BTreeSet<S
     masking.map(|(_, function)| function.names.first().cloned().unwrap_or_default()).collect()
 }
 
-/// Of the instructions that an exception executed the one of the most cycles, which the next interrupt may have to wait for, and these.
+/// The instruction with the most cycles among those that an exception executed, for which the next interrupt may have to wait, and these cycles.
 pub fn longest(image: &Image, hits: &Tally, exception: u32) -> Option<(u32, u32)> {
     let executed = hits.of(exception).filter_map(|(address, _)| image.instructions.get_key_value(&address));
     let priced = executed.map(|(address, instruction)| (instruction.cycles, *address));

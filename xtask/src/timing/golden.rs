@@ -1,4 +1,4 @@
-//! The numbers that the repository holds: the page of costs, and the sizes that the images must not outgrow.
+//! The numbers that the repository keeps: the page of costs, and the sizes that the images must not exceed.
 
 use super::page;
 use super::report::Report;
@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// By how much a number of the page may have moved: this share, or this much.
+/// The amount by which a number of the page may have moved: this share, or this much.
 const MOVED_SHARE: f64 = 0.05;
 const MOVED: f64 = 10.0;
 /// Sizes are kept rounded up to a multiple of this many bytes.
@@ -17,11 +17,11 @@ const GRAIN: u64 = 256;
 pub struct Golden {
     path: PathBuf,
     text: String,
-    /// `true` if numbers may only fall (sizes); if not, they may move a little either way.
+    /// `true` if numbers may only fall (sizes); otherwise they may move a little either way.
     falls: bool,
 }
 
-/// The files by what was measured.
+/// The files, by what was measured.
 pub fn files(report: &Report) -> [Golden; 2] {
     let file = |name: &str| build::root().join(name);
     [

@@ -1,8 +1,8 @@
 //! The emulator's log, line by line: executed instructions and what the interrupt controller did between them.
 //!
-//! QEMU runs blocks, straight runs of instructions. It lists what is in a block before it runs it for the first time, and announces each
-//! run. What is announced counts when the next line has come: it may be withdrawn as a whole, or end early where an access to a
-//! peripheral's register has to be the last of its block; then the next block begins with that.
+//! QEMU runs blocks, straight runs of instructions. It lists a block's contents before running it for the first time, and announces each run. Announced
+//! instructions count only when the next line has come: the announcement may be withdrawn as a whole, or end early if an access to a peripheral's
+//! register has to be the last of its block; then the next block begins with that access.
 
 use crate::elf::Image;
 use anyhow::{Context, Result, bail};
@@ -45,7 +45,7 @@ impl<'a> Log<'a> {
         Self { image, blocks: HashMap::new(), listed: None, announced: Rc::new([]), ends_early: false }
     }
 
-    /// Takes the next line and hands on what has happened by then.
+    /// Takes the next line and returns what has happened by then.
     pub fn take(&mut self, line: &[u8], mut happened: impl FnMut(Event) -> Result<()>) -> Result<()> {
         if line.starts_with(b"Trace ") {
             let Some((block, start)) = announcement(line) else { return Ok(()) };

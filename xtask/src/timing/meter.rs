@@ -21,7 +21,7 @@ pub struct Call {
     pub latency: u32,
     /// Handlers that were active with it.
     pub depth: usize,
-    /// The exception whose handler it came into; `None`: the idle loop.
+    /// The exception whose handler it interrupted; `None`: the idle loop.
     pub within: Option<u32>,
 }
 
@@ -45,13 +45,13 @@ pub struct Meter {
     pending: BTreeMap<u32, u32>,
     /// Every interrupt that has returned, in the order of their returns.
     pub calls: Vec<Call>,
-    /// `true` if what each of them executed is kept.
+    /// `true` if the instructions that each of them executed are kept.
     pub keeps_paths: bool,
     /// The instructions that each of them executed, if they are kept.
     pub paths: Vec<Path>,
     /// The number of executions of each address.
     pub hits: Tally,
-    /// The instructions that were executed behind each call, by its return address.
+    /// The instructions that were executed inside each call, by its return address.
     pub behind: Tally,
     /// Bytes of stack that each exception takes at most, with its frame.
     pub deepest: BTreeMap<u32, i32>,
@@ -175,7 +175,7 @@ impl Meter {
         let Flow::To(target) = instruction.flow else { return };
         let back = address + instruction.length;
         if self.link.contains(&target) {
-            // There and back. Without a link the caller's caller is where it goes on, or nobody.
+            // There and back. Without a link, execution continues at the caller's caller, or at none.
             let callers = handler.within.last().map_or(u32::MAX, |(back, _)| *back);
             handler.resumes = Some(if instruction.links { back } else { callers });
             handler.call.cycles += 2 * REFILL;

@@ -1,13 +1,14 @@
-//! `cargo xtask timing`: what the interrupts execute, against the budgets.
+//! `cargo xtask timing`: the instructions that the interrupts execute, against the budgets.
 //!
 //! The emulator logs every instruction outside the idle loop while the rig drives the image through every mode. The log
 //! tells when an interrupt becomes pending, is entered and returns, so each instruction belongs to the innermost handler.
 //! Instructions of the link to the rig are left out. The n-th interrupt of the log is the n-th that the rig served, and
 //! the rig knows its mode. All of it is deterministic: two runs give the same numbers.
 //!
-//! [`system`] says what is driven, [`drive`] runs the rig, [`log`] reads a line, [`meter`] assigns instructions to interrupts,
+//! [`system`] defines what is driven, [`drive`] runs the rig, [`log`] reads a line, [`meter`] assigns instructions to interrupts,
 //! [`cost`](crate::thumb::cost) prices them, [`statistics`] and [`tally`] sum them up, [`parts`] and [`profile`] say whose they are, [`blocks`] counts
-//! building blocks by themselves, [`entry`] what could delay an entry, [`budget`] judges, [`report`], [`tables`] and [`page`] tell, [`golden`] compares with what the repository holds.
+//! building blocks by themselves, [`entry`] finds what could delay an entry, [`budget`] judges, [`report`], [`tables`] and [`page`] present the
+//! results, and [`golden`] compares them with what the repository holds.
 
 mod blocks;
 mod budget;

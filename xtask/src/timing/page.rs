@@ -1,5 +1,4 @@
-//! The numbers as the page of the documentation, `docs/cost.md`, and as plain text. What the page says in words stands in the folder
-//! `page`.
+//! The numbers as the page of the documentation, `docs/cost.md`, and as plain text. The prose of the page is in the folder `page`.
 
 use super::report::Report;
 use super::system::Measured;
@@ -57,7 +56,7 @@ fn remarks(measured: &Measured) -> String {
     for function in &measured.masking {
         text += &format!("masks interrupts: {function}\n");
     }
-    // Which instruction the PWM interrupt may have to wait for.
+    // The instruction for which the PWM interrupt may have to wait.
     if let Some((address, cycles)) = measured.longest {
         let name = measured.image.name_at(address);
         text += &format!("control's longest instruction: {cycles} cycles, at {address:#x} in {name}\n");

@@ -8,11 +8,11 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The group of a part, by whether the papers' systems have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Group {
-    /// The part that the papers' systems have, too.
+    /// A part that the papers' systems have, too.
     Paper,
-    /// The part that the drive has beyond them.
+    /// A part that the drive has beyond them.
     Beyond,
-    /// The part that carries both.
+    /// A part that carries both.
     Around,
 }
 
@@ -31,9 +31,9 @@ impl Group {
 
 use Group::{Around, Beyond, Paper};
 
-/// Parts, their groups and their sources: files and folders below `src/` of one of
-/// the repository's crates, whichever it is; behind a `#` a word of the function's name. Of the sources that an instruction's file lies
-/// in the longest decides. First the innermost function is asked, then those that it was inlined into.
+/// Parts, their groups and their sources: files and folders below `src/` of any of the repository's crates; after a `#`, a word of the function's name.
+/// Among the sources that contain an instruction's file, the longest decides. The innermost function is asked first, then those that it was inlined
+/// into.
 const PARTS: [(&str, Group, &[&str]); 28] = [
     ("frames: vectors, angles, sine and cosine", Paper, &["frames/"]),
     ("look-up in flux map and tables", Paper, &["machine/lookup.rs"]),
@@ -68,7 +68,7 @@ const PARTS: [(&str, Group, &[&str]); 28] = [
     ("task", Around, &["drive/"]),
     ("entry and board", Around, &["firmware/", "board/"]),
 ];
-/// The part that nobody owns: copies and the like.
+/// The part that belongs to no source: copies and the like.
 const REST: &str = "library";
 
 /// A part of an interrupt.
@@ -76,23 +76,23 @@ const REST: &str = "library";
 pub struct Part {
     pub name: &'static str,
     pub group: Group,
-    /// Instructions a call on the mean, and in the longest call.
+    /// Instructions per call on average, and in the longest call.
     pub mean: f64,
     pub longest: u32,
 }
 
-/// The names of the parts of a group, and of what nobody owns.
+/// The names of the parts of a group, and of the part that belongs to none.
 pub fn names(group: Group) -> impl Iterator<Item = &'static str> {
     let named = PARTS.iter().filter(move |(_, of, _)| *of == group).map(|(name, ..)| *name);
     named.chain((group == Around).then_some(REST))
 }
 
-/// Instructions of these parts together, on the mean and in the longest call.
+/// Instructions of these parts together, on average and in the longest call.
 pub fn together<'a>(parts: impl Iterator<Item = &'a Part>) -> (f64, u32) {
     parts.fold((0.0, 0), |(mean, longest), part| (mean + part.mean, longest + part.longest))
 }
 
-/// The parts of an interrupt that came `calls` times and executed what `hits` counts by address, by their groups, the dearest first. The
+/// The parts of an interrupt that came `calls` times and executed the addresses that `hits` counts, by their groups, the most expensive first. The
 /// sources that instructions came from are added to `sources`.
 pub fn parts(
     profile: &Profile,
@@ -150,11 +150,11 @@ fn lies_in(place: &Place, source: &str) -> bool {
 fn below_src(file: &str) -> Option<&str> {
     let inside = file.strip_prefix(build::root().to_str()?)?;
     let (_, path) = inside.split_once("/src/")?;
-    // A module of another folder's: `bin/../firmware/zs9.rs`.
+    // A module in another folder: `bin/../firmware/zs9.rs`.
     Some(path.rsplit_once("/../").map_or(path, |(_, path)| path))
 }
 
-/// Refuses a list of parts of which a source is in no interrupt: it was renamed, and what it costs is counted elsewhere.
+/// Refuses a list of parts if one of its sources is in no interrupt: it was renamed, and its cost is counted elsewhere.
 pub fn all_found(sources: &BTreeSet<&str>) -> Result<()> {
     let listed = PARTS.iter().flat_map(|(part, _, listed)| listed.iter().map(move |source| (part, source)));
     let missing = listed.filter(|(_, source)| !sources.contains(**source));

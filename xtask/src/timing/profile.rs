@@ -9,7 +9,7 @@ use std::path::Path;
 
 type Reader<'a> = gimli::EndianSlice<'a, gimli::LittleEndian>;
 
-/// Instructions in a function itself, with what the standard library put into it, and with all that it calls.
+/// Instructions in a function itself, with what the standard library put into it, and with everything that it calls.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Share {
     pub own: u64,
@@ -21,7 +21,7 @@ pub struct Share {
 pub struct Place {
     /// Demangled.
     pub function: String,
-    /// Its path on the machine that built the image; empty where the debug information names none.
+    /// Its path on the machine that built the image; empty if the debug information names none.
     pub file: String,
 }
 
@@ -41,8 +41,8 @@ impl<'a> Profile<'a> {
         Ok(Self { lines: Lines::from_dwarf(dwarf)? })
     }
 
-    /// Every function's share of an exception's instructions. `hits` are executed addresses, `behind` the instructions
-    /// behind each call by its return address.
+    /// Every function's share of an exception's instructions. `hits` are executed addresses, `behind` the instructions inside each call by its return
+    /// address.
     pub fn shares(&self, exception: u32, hits: &Tally, behind: &Tally) -> Result<BTreeMap<String, Share>> {
         let mut shares = BTreeMap::<String, Share>::new();
         for (address, count) in hits.of(exception) {
@@ -82,7 +82,7 @@ impl<'a> Profile<'a> {
     }
 }
 
-/// Whose instruction it is: the innermost of our own functions, else the one that stands out of line.
+/// The owner of an instruction: the innermost of our own functions, else the one that stands out of line.
 fn owner(chain: &[String]) -> Option<&String> {
     chain.iter().find(|name| name.contains("tractive::")).or(chain.last())
 }

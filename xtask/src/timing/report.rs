@@ -12,16 +12,16 @@ const INTERRUPTS: [&str; 2] = ["control", "pwm"];
 /// Everything that was measured and judged.
 pub struct Report<'a> {
     pub systems: &'a [Measured],
-    /// The control interrupt of each under the papers' ordinary law.
+    /// The control interrupt of each system under the papers' ordinary law.
     pub pi: &'a [LawCost],
     pub blocks: &'a [Block],
     pub judged: &'a [Judged],
 }
 
-/// The work that every block has besides its own.
+/// The overhead of every block besides its own work.
 pub const CALL: &str = "call/nothing";
 
-/// Instructions of a block's work on its dearest input.
+/// Instructions of a block's work for its most expensive input.
 pub fn net(blocks: &[Block], block: &Block) -> u32 {
     let call = blocks.iter().find(|block| block.name == CALL).map_or(0, |block| block.max);
     block.max.saturating_sub(call)
@@ -71,7 +71,7 @@ impl Measured {
         pairs.filter_map(|(name, mode)| Some((name, mode, self.statistics.row(mode, None, name)?)))
     }
 
-    /// Mode with direction, and what was counted there; nothing where the rig names no direction.
+    /// Mode with direction, and what was counted there; nothing if the rig names no direction.
     pub fn directed(&self, interrupt: &str, mode: &str) -> impl Iterator<Item = (String, &Row)> {
         let row = move |direction| {
             Some((format!("{mode}, {direction}"), self.statistics.row(mode, Some(direction), interrupt)?))

@@ -66,9 +66,9 @@ impl Row {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
     pub interrupt: &'static str,
-    /// `idle`, or the interrupt that it came into.
+    /// `idle`, or the interrupt that it interrupted.
     pub from: &'static str,
-    /// Instructions from its event to the first of its handler.
+    /// Instructions from its event to the first one of its handler.
     pub latency: Spread,
 }
 
@@ -87,7 +87,7 @@ type Key = (String, Option<&'static str>, String);
 #[derive(Clone, Debug, Default)]
 pub struct Statistics {
     rows: BTreeMap<Key, Row>,
-    /// Modes as they came.
+    /// Modes in the order in which they came.
     seen: Vec<String>,
     /// Largest stator frequency, in Hz.
     pub hertz: f64,
@@ -124,7 +124,7 @@ impl Statistics {
         Ok(())
     }
 
-    /// The modes that were seen: first those of a list in its order, then the others as they came, without pulses last.
+    /// The modes that were seen: first those of a list in its order, then the others in the order in which they came, without pulses last.
     pub fn modes(&self, first: &str) -> Vec<&str> {
         let mut modes: Vec<_> = self.seen.iter().map(String::as_str).collect();
         let place = |mode: &str| first.split(' ').position(|known| known == mode).unwrap_or(usize::MAX);
@@ -132,7 +132,7 @@ impl Statistics {
         modes
     }
 
-    /// Bytes of stack below the idle loop's, if the higher interrupt comes where control's is deepest.
+    /// Bytes of stack below the idle loop's, if the higher interrupt comes where control's stack is deepest.
     pub fn stack_bytes(&self) -> i32 {
         self.deepest.values().sum()
     }
@@ -147,7 +147,7 @@ impl Statistics {
         }
     }
 
-    /// By how many instructions the entries of an interrupt differ, wherever it comes.
+    /// The number of instructions by which the entries of an interrupt differ, wherever it comes.
     pub fn entry_spread(&self, interrupt: &str) -> u32 {
         let entries = || self.entries.iter().filter(|entry| entry.interrupt == interrupt);
         let latest = entries().map(|entry| entry.latency.max).max();
@@ -155,7 +155,7 @@ impl Statistics {
         latest.unwrap_or(u32::MAX) - first.unwrap_or(0)
     }
 
-    /// One interrupt in one mode, and in one direction if one is named, if it was seen there.
+    /// One interrupt in one mode, and in one direction if one is named; `None` if it was not seen there.
     pub fn row(&self, mode: &str, direction: Option<&'static str>, interrupt: &str) -> Option<&Row> {
         self.rows.get(&(mode.to_owned(), direction, interrupt.to_owned()))
     }
@@ -173,19 +173,19 @@ impl Statistics {
         })
     }
 
-    /// The dearest mode's largest load, in percent.
+    /// The largest load of the most expensive mode, in percent.
     pub fn worst_load(&self) -> f64 {
         let modes = self.rows.keys().map(|(mode, ..)| mode).filter(|mode| *mode != "off");
         modes.filter_map(|mode| self.load(mode, None)).map(|load| load.max).fold(0.0, f64::max)
     }
 
-    /// Over everything that was counted; entries and returns are among the cycles.
+    /// Mean over everything that was counted; the cycles include entries and returns.
     pub fn cycles_per_instruction(&self) -> f64 {
         let sum = |of: fn(&Row) -> &Spread| self.whole().map(|(_, row)| of(row).sum).sum::<u64>() as f64;
         sum(|row| &row.cycles) / sum(|row| &row.instructions).max(1.0)
     }
 
-    /// The rows of one interrupt over all modes. A PWM interrupt that finds a fault makes no pulses any more, so it is among `off`.
+    /// The rows of one interrupt over all modes. A PWM interrupt that finds a fault makes no more pulses, so it is among `off`.
     pub fn of<'a>(&'a self, interrupt: &'a str) -> impl Iterator<Item = &'a Row> {
         self.whole().filter(move |((.., name), _)| name == interrupt).map(|(_, row)| row)
     }

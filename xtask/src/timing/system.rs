@@ -1,4 +1,4 @@
-//! The systems, and what they are driven through.
+//! The systems, and the scenarios that they are driven through.
 
 use super::drive::{Bench, Drive, Served, is_link};
 use super::entry;
@@ -15,25 +15,22 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Both directions of torque and of rotation through every mode, up to the highest stator frequency, with dead time that is to be
-/// compensated.
+/// Both directions of torque and of rotation through every mode, up to the highest stator frequency, with dead time that has to be compensated.
 const DRIVES: [&str; 2] = ["--to=6000 --dead-time-us=3", "--to=-6000 --brake --dead-time-us=3"];
 /// An operator who commands, motoring and braking.
 const OPERATED: [&str; 2] = ["--to=6000 --operated", "--to=6000 --brake --operated"];
-/// Then short ones: the PWM timer starts this much later against the control timer, in µs. Halves of the asynchronous
-/// carrier last five control periods and five ninths, so they meet nine phases, 11 µs apart; these fall between.
-/// A demand that is no number ends them.
+/// Then short ones: the PWM timer starts this much later relative to the control timer, in µs. Halves of the asynchronous carrier last five control
+/// periods and five ninths, so they meet nine phases, 11 µs apart; these phases lie in between. A demand that is not a number ends these drives.
 const PHASES_US: [f64; 3] = [3.0, 6.0, 9.0];
 const SHORT_S: f64 = 0.02;
-/// From the run's beginning to the scenario's, in control periods.
+/// Time from the run's beginning to the scenario's, in control periods.
 const LEAD_PERIODS: usize = 100;
 const CONTROL_S: f64 = 1e-4;
-/// From the first frozen sample to the fault, in control periods.
+/// Time from the first frozen sample to the fault, in control periods.
 const FROZEN_PERIODS: f64 = 19.0;
 
-/// The ZS9 in every scheme; each drive motors, weakens the field and brakes. With two carrier periods a control period, and
-/// with a fault of either interrupt at the end.
-/// The faults come where both motors weaken the field at their limits.
+/// The ZS9 in every scheme; each drive motors, weakens the field and brakes. Also with two carrier periods a control period, and with a fault of either
+/// interrupt at the end. The faults come while both motors weaken the field at their limits.
 const DUAL_DRIVES: [&str; 8] = [
     "--scheme=s",
     "--scheme=rs",
@@ -45,10 +42,10 @@ const DUAL_DRIVES: [&str; 8] = [
     "--scheme=zvo --carrier-hz=20000 --uin=800 --inject=leg-stuck-on@0.115",
 ];
 
-/// The first of them, without a fault.
+/// The number of the first of them, which have no fault.
 const HEALTHY_DUAL_DRIVES: usize = 5;
 
-/// Up to full torque and weakening with an operator.
+/// An operator's talk up to full torque and field weakening.
 const DUAL_TALK: &str = "rig/scripts/zs9-timing.talk";
 
 /// A system of the repository.
@@ -58,7 +55,7 @@ pub struct System {
     pub name: &'static str,
     pub build: build::System,
     scenario: &'static str,
-    /// The modes that its tables begin with; the others follow as the drives came to them.
+    /// The modes that its tables begin with; the others follow in the order in which the drives reached them.
     pub first_modes: &'static str,
 }
 
@@ -126,7 +123,7 @@ pub fn identification(toolchain: &Toolchain, rig: &Path, qemu: &Path) -> Result<
     Ok(statistics)
 }
 
-/// The control interrupt's instructions under a law: the mean in its dearest mode, and the most.
+/// The control interrupt's instructions under a law: the mean in its most expensive mode, and the most.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LawCost {
     pub mean: f64,
@@ -151,8 +148,8 @@ fn traction(bench: &Bench, sum: &mut Sum) -> Result<()> {
     let drives = drive_all("pmasynrm", &plan(ordinary.chain(phases).collect()))?;
     let mut provoked = Vec::new();
     for (options, drive) in DRIVES.iter().zip(&drives) {
-        // A switch of mode, a fault and full torque at the limit of the current, all in one tick. Frozen currents are found
-        // after a number of periods, and of all faults they cost the most: the whole control law is executed besides.
+        // A switch of mode, a fault and full torque at the limit of the current, all in one tick. Frozen currents are detected only after a number of
+        // periods, and of all faults they cost the most: the whole control law is executed as well.
         let freezes_s = switches_s(drive).into_iter().map(|switch_s| switch_s - FROZEN_PERIODS * CONTROL_S);
         provoked.extend(freezes_s.map(|freeze_s| format!("{options} --freeze-at={freeze_s:.6}")));
         // The same for the PWM interrupt: phase currents that are wrong for the first time at the boundary itself.
@@ -169,7 +166,7 @@ fn traction(bench: &Bench, sum: &mut Sum) -> Result<()> {
     Ok(())
 }
 
-/// Each of them with its options, as many at once as there are processors; in their order.
+/// Runs each of them with its options, as many at once as there are processors; the results are in their order.
 fn drive_all(system: &'static str, plan: &[(&Bench, String)]) -> Result<Vec<Drive>> {
     let drives = plan.par_iter().progress_with(process::bar(system, plan.len())).map(|(bench, options)| {
         let drive = bench.drive(&options.split(' ').collect::<Vec<_>>());
@@ -178,8 +175,8 @@ fn drive_all(system: &'static str, plan: &[(&Bench, String)]) -> Result<Vec<Driv
     drives.collect()
 }
 
-/// For each boundary where the modulator changes from one mode with pulses to another, a moment behind the last control sample before it,
-/// in the scenario's time: there only the PWM interrupt sees what comes.
+/// For each boundary where the modulator changes from one mode with pulses to another, an instant just after the last control sample before it, in the
+/// scenario's time: there only the PWM interrupt sees what comes.
 fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
     let [(_, control), _] = INTERRUPTS;
     let depths: Vec<_> =
@@ -191,7 +188,7 @@ fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
             continue;
         }
         if last != "off" && mode != "off" && mode != last {
-            // The list is in the order of the interrupts' ends: one that it came into has sampled before.
+            // The list is in the order in which the interrupts end: a control interrupt that was interrupted has sampled before.
             let sampled = samples + usize::from(depths.get(samples).is_some_and(|depth| *depth > 1));
             found.push((sampled as f64 + 0.02 - LEAD_PERIODS as f64) * CONTROL_S);
         }
@@ -200,8 +197,8 @@ fn switching_boundaries_s(drive: &Drive) -> Vec<f64> {
     found
 }
 
-/// The instants at which control works for another mode with pulses than before, from one with pulses, in the scenario's time: the middle of the period
-/// before that tick.
+/// The instants at which control begins to work for another mode with pulses, coming from one with pulses, in the scenario's time: the middle of the
+/// period before that tick.
 fn switches_s(drive: &Drive) -> Vec<f64> {
     let served = drive.served.iter().filter(|served| served.interrupt == "control");
     let modes: Vec<_> = served.map(|served| served.mode.as_str()).collect();
@@ -233,7 +230,7 @@ impl Sum {
         Ok(())
     }
 
-    /// Takes it into the profile; the short drives would shift the means.
+    /// Adds it to the profile; the short drives would shift the means.
     fn profile(&mut self, drive: &Drive) {
         self.hits.merge(&drive.hits);
         self.behind.merge(&drive.behind);
@@ -280,7 +277,7 @@ impl Measured {
         Ok(Self { system, image, statistics, parts, sources, masking, longest, path, sum })
     }
 
-    /// The dearest functions of each interrupt.
+    /// The most expensive functions of each interrupt.
     pub fn profile_table(&self, count: usize) -> Result<String> {
         let bytes = profile::bytes(&self.path)?;
         let profile = Profile::new(&bytes)?;
@@ -340,12 +337,12 @@ pub mod tests {
 
     #[test]
     fn the_load_is_that_of_both_interrupts() {
-        // 1,700 cycles ten thousand times a second are a tenth of 170 MHz; one PWM interrupt comes for two of control.
+        // 1,700 cycles ten thousand times a second are a tenth of 170 MHz; there is one PWM interrupt for every two of control.
         let statistics = example().statistics;
         let load = statistics.load("mid7", None).unwrap();
         assert!((load.mean - 15.0).abs() < 1e-9 && (load.max - 15.0).abs() < 1e-9);
         assert!(statistics.load("square", None).is_none());
-        // Motoring it comes for each of control; braking it was never seen.
+        // Motoring, there is one for each of control; braking was never seen.
         assert!((statistics.load("mid7", Some("motoring")).unwrap().max - 20.0).abs() < 1e-9);
         assert!(statistics.load("mid7", Some("braking")).is_none());
     }

@@ -48,7 +48,7 @@ impl Table {
     }
 }
 
-/// Both interrupts of all systems in each mode, instructions beside cycles, and what they load the processor with.
+/// Both interrupts of all systems in each mode, instructions next to cycles, and the processor load they cause.
 pub fn modes(report: &Report) -> Table {
     let row = |(measured, mode): (&Measured, &str)| {
         let of = |interrupt| measured.statistics.row(mode, None, interrupt);
@@ -68,7 +68,7 @@ pub fn modes(report: &Report) -> Table {
     Table::new(&head, report.systems.iter().flat_map(modes).filter_map(row))
 }
 
-/// Bytes that each image takes, and what its interrupts wait at most.
+/// Bytes that each image takes, and the longest waits of its interrupts.
 pub fn images(report: &Report) -> Table {
     let rows = report.systems.iter().map(|measured| {
         let sizes = &measured.image.sizes;
@@ -79,7 +79,7 @@ pub fn images(report: &Report) -> Table {
     Table::new(&["bytes", ">code", ">tables", ">RAM", ">flight recorder", ">stack"], rows)
 }
 
-/// The work that a tick of a plain field-oriented controller has, as this drive does it: parts of the mean control interrupt, and the block.
+/// The work that a tick of a plain field-oriented controller takes in this drive: parts of the mean control interrupt, and the block.
 pub fn alike(report: &Report) -> Table {
     let parts = ["entry and board", "protection", "speed from the angle"];
     let mut sum = 0.0;
@@ -110,7 +110,7 @@ pub fn laws(report: &Report) -> Table {
     Table::new(&["", "law", ">mean in the dearest mode", ">longest"], rows)
 }
 
-/// The counts of each interrupt in each mode, by direction where the rig names one.
+/// The counts of each interrupt in each mode, by direction if the rig names one.
 pub fn interrupts(measured: &Measured) -> Table {
     let rows = measured.rows().flat_map(|(name, mode, row)| {
         let mut rows: Vec<_> = measured.directed(name, mode).collect();
@@ -166,7 +166,7 @@ pub fn blocks(report: &Report) -> Table {
     Table::new(&["block", ">instructions", ">net", ">cycles", ">largest error"], rows)
 }
 
-/// From where each interrupt is entered, and how long it waits.
+/// The places from which each interrupt is entered, and how long it waits.
 pub fn entries(report: &Report) -> Table {
     let entries = report.systems.iter().flat_map(|measured| {
         measured.statistics.entries.iter().map(move |entry| (measured.system.name, entry))
@@ -179,7 +179,7 @@ pub fn entries(report: &Report) -> Table {
     Table::new(&["", "interrupt", "comes into", ">times", ">waits at least", ">at most"], rows)
 }
 
-/// The table of what has a budget, and whether it is kept.
+/// The table of values that have a budget, and whether it is kept.
 pub fn budgets(report: &Report) -> Table {
     let rows = report.judged.iter().map(|judged| {
         let (value, budget) = (judged.value.ceil().to_string(), judged.budget.to_string());

@@ -1,6 +1,6 @@
 //! Counts by exception and address, quick to add to.
 
-/// A count for each half-word of code, apart for each exception.
+/// A count for each half-word of code, separately for each exception.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
     counts: Vec<(u32, Vec<u64>)>,
@@ -12,7 +12,7 @@ impl Tally {
         self.add_many(exception, address, 1);
     }
 
-    /// All of another.
+    /// Adds all counts of another.
     pub fn merge(&mut self, other: &Self) {
         for exception in other.counts.iter().map(|(exception, _)| *exception) {
             for (address, count) in other.of(exception) {

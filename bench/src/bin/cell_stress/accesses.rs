@@ -1,5 +1,5 @@
-//! The accesses of the low-priority side, which the PWM interrupt lands in, each a function of its own: `cargo xtask test` finds them
-//! by this module and wants every executed instruction of theirs hit. Sizes are those of the drives' cells.
+//! The accesses of the low-priority side, which the PWM interrupt hits, each a function of its own: `cargo xtask test` finds them by this module and
+//! requires that every instruction of theirs that is executed is hit. Sizes are those of the drives' cells.
 
 use crate::broken::{Eager, Plain, Unfrozen};
 use crate::message::Message;
@@ -9,7 +9,7 @@ pub static DOWNLINK_10: Mailbox<Message<10>, 10> = Mailbox::new();
 pub static UPLINK_4: Seqlock<Message<4>, 4> = Seqlock::new();
 pub static UPLINK_10: Seqlock<Message<10>, 10> = Seqlock::new();
 pub static TRAIL_6: History<6> = History::new();
-/// The halves that control plans.
+/// The carrier halves that control plans.
 pub static PLANNED_9: Mailbox<Message<9>, 9, 4> = Mailbox::new();
 /// Never written.
 pub static EMPTY_6: History<6> = History::new();

@@ -61,7 +61,7 @@ impl<const N: usize, const R: usize> Unfrozen<N, R> {
     }
 }
 
-/// A double buffer that names the slot before it is filled: what was in it is read once more, or half of it.
+/// A double buffer that announces the slot before it is filled: its old contents are read once more, or half of them.
 pub struct Eager<const N: usize> {
     slots: [[AtomicU32; N]; 2],
     published: AtomicU32,

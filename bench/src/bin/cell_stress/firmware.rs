@@ -9,18 +9,18 @@ use tractive::board::qemu::{self, Interrupt as interrupt};
 use tractive::ports::ControlPort;
 use tractive::time::Instant;
 
-/// Control timer's period: room for the longest control interrupt and four PWM interrupts, and a whole number of instructions (of 1.6
-/// ticks each), so that the sweep leaves none out.
+/// Control timer's period: room for the longest control interrupt and four PWM interrupts, and a whole number of instructions (of 1.6 ticks each), so
+/// that the sweep skips none.
 const CONTROL_TICKS: u32 = 3_496;
 /// PWM timer's period.
 const PWM_TICKS: u32 = CONTROL_TICKS + 1;
 
-/// First part: one PWM interrupt in each control period. Control interrupts in which each subject meets each phase, because
-/// the number of subjects and the PWM timer's period have no divisor in common.
+/// First part: one PWM interrupt in each control period. The number of control interrupts lets each subject meet each phase, because the number of
+/// subjects and the PWM timer's period have no common divisor.
 const SINGLE_ROUNDS: u32 = PWM_TICKS * SUBJECTS.len() as u32;
 const _: () = assert!(!PWM_TICKS.is_multiple_of(SUBJECTS.len() as u32));
-/// Second part: four PWM interrupts in a row, so that a reader is hit in every try, and where it gives up. One subject after the other, a
-/// sweep for each of these times from one interrupt's end to the next: any part of a try.
+/// Second part: four PWM interrupts in a row, so that a reader is hit in every try, also when it gives up. One subject after the other, with a sweep
+/// for each of these times from one interrupt's end to the next: any part of a try.
 const BURST: u32 = 4;
 const PAUSES_TICKS: [u32; 33] = [
     12, 14, 16, 18, 20, 22, 24, 26, 28, 30, 32, 34, 36, 38, 40, 42, 44, 47, 51, 55, 60, 65, 70, 75, 80, 85,

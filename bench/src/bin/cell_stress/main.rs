@@ -1,10 +1,9 @@
-//! The cells between the interrupts, hit on every instruction: an image for QEMU, run by `cargo xtask test --only cells`.
+//! The cells between the interrupts, interrupted at every instruction: an image for QEMU, run by `cargo xtask test --only cells`.
 //!
-//! The periods of the two timers differ by one tick, and a tick is less than an instruction: so from one control interrupt to the
-//! next the PWM interrupt lands no more than one instruction later, until it has landed everywhere. In each
-//! control interrupt the low-priority side of one cell is used once; in each PWM interrupt the high-priority side of the same cell.
-//! Every value carries a checksum and its number, so that a torn, a stale and a lost one show. Two broken cells take part, to show that
-//! the test can fail. Where a PWM interrupt landed is the return address on its stack.
+//! The periods of the two timers differ by one tick, and a tick is less than an instruction. So from one control interrupt to the next the PWM
+//! interrupt lands at most one instruction later, until it has landed everywhere. Each control interrupt uses the low-priority side of one cell once;
+//! each PWM interrupt uses the high-priority side of the same cell. Every value carries a checksum and its number, so that torn, stale and lost values
+//! show. Two broken cells take part, to show that the test can fail. The return address on the stack tells where a PWM interrupt landed.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// The image runs in the emulator; on the host there is nothing to do but to say so.

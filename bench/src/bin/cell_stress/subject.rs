@@ -79,7 +79,7 @@ pub static SUBJECTS: [Subject; 18] = [
         |c| c.read(|| uplink_12_read(&UPLINK_12)),
         |c| c.publish(|m| UPLINK_12.publish(*m)),
     ),
-    // Released and frozen again under the reader's hands: then it gets nothing.
+    // Released and frozen again while the reader reads: then it gets nothing.
     Subject::new("ring-10", |c| c.read(|| ring_read(&RING)), release_and_freeze),
     Subject::new(
         "trail-6",
@@ -102,7 +102,7 @@ pub static SUBJECTS: [Subject; 18] = [
     Subject::new("broken-eager-down", |c| c.publish(eager_publish), |c| c.read(|| EAGER.read())),
 ];
 
-/// Those whose reader tries again, for several interrupts in a row; it may give up then.
+/// Subjects whose reader tries again, for several interrupts in a row; it may give up then.
 pub static BURST_SUBJECTS: [Subject; 4] = [
     Subject::new("burst-ring-10", |c| c.read(|| ring_read(&RING)), release_and_freeze),
     Subject::new(
@@ -155,7 +155,7 @@ impl Counts {
         self.done.store(number, SeqCst);
     }
 
-    /// The newest value: none older than the last one that was done before, none newer than the last one begun since.
+    /// The newest value: not older than the last one completed before, not newer than the last one begun since.
     fn read<const N: usize>(&self, read: impl Fn() -> Option<Message<N>>) {
         let oldest = self.done.load(SeqCst);
         compiler_fence(SeqCst);
@@ -166,7 +166,7 @@ impl Counts {
         }
     }
 
-    /// The one so many before the newest, as it is read while later ones are not yet valid: exactly that one.
+    /// The value so many before the newest, read while later ones are not yet valid: exactly that one.
     fn read_before<const N: usize>(&self, back: u32, read: impl Fn(u32) -> Option<Message<N>>) {
         let newest = self.begun.load(SeqCst);
         if newest > back {

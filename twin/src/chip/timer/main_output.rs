@@ -72,11 +72,11 @@ impl Timer {
         self.locked = self.locked.max(value >> 8 & 0b11);
     }
 
-    /// Bits that the lock level holds are written with other values (RM0440, BDTR.LOCK).
+    /// Bits that the lock level protects are written with other values (RM0440, BDTR.LOCK).
     pub(super) fn check_lock(&self, register: usize, value: u32, findings: &mut Findings) {
         let held = match (register, self.locked) {
             (_, 0) => 0,
-            // The level itself is written once.
+            // The lock level itself is written once.
             (BDTR, 1) => 0x0F_FFFF & !MOE & !(0b11 << 10),
             (BDTR, _) => 0x0F_FFFF & !MOE,
             (CR2, _) => 0x3F00,

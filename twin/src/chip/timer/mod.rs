@@ -226,7 +226,7 @@ impl Timer {
         }
     }
 
-    /// A debugger halts it: the counter stands, the outputs are off as without MOE.
+    /// A debugger halts it: the counter stands still and the outputs are off, as without MOE.
     pub fn freeze(&mut self, now: Time, cycle: Time) {
         self.base = (self.position(now, cycle), now);
         self.frozen = true;
@@ -336,7 +336,7 @@ impl Timer {
         }
     }
 
-    /// A register is written; `false` if the twin has none such.
+    /// A register is written; `false` if the twin has no such register.
     pub fn write(
         &mut self,
         offset: u32,
