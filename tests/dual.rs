@@ -379,7 +379,7 @@ fn speeds_are_known_once_both_are() {
     }
 }
 
-/// Every tenth period, from the first one on in which it was asked; a board of another's commands never.
+/// The operator is told in every tenth period, from the first one on in which it was asked; on a board that another one commands, never.
 #[test]
 fn the_operator_is_told_once_a_slot_and_only_where_it_commands() {
     for operated in [false, true] {

@@ -329,8 +329,8 @@ fn a_sensor_that_fails_does_not_hide_a_current_that_stays() {
     }
 }
 
-/// The number of periods that a watch takes for these currents and this voltage, of a rotor whose angle `turns` or stands, once the voltage
-/// has been `before_v`.
+/// Periods that a watch takes for these currents and this voltage, with a rotor whose angle `turns` or stands, after the voltage has been
+/// `before_v`.
 fn frozen_after(
     a: f32,
     (before_v, voltage_v): (f32, f32),

@@ -63,8 +63,8 @@ fn the_first_torque_takes_a_direct_drive_to_half_of_its_largest_speed() {
     assert!((speed_rpm - 75.0).abs() < 4.0, "{speed_rpm}");
 }
 
-/// A zero that is some degrees off: the tables are of the zero that is right, the key to change and the number to add are told, and with it
-/// the first torque is.
+/// A zero that is some degrees off: the tables are made for the right zero, the key to change and the number to add are told, and the first
+/// torque uses the right zero.
 #[test]
 fn a_zero_that_is_off_is_told_and_the_tables_are_made() {
     for error_deg in [8.0, -10.0] {

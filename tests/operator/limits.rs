@@ -337,8 +337,8 @@ fn every_limit_of_a_request_may_be_as_rated_and_no_more() {
     }
 }
 
-/// Levels of a link of 1,000 to 1,800 V that trips at 850 and 2,070 V: motoring ends half way to the lower one, braking at 0.6 of the way to the
-/// upper one and over half of that; the line's voltage ends it sooner.
+/// Levels of a link of 1,000 to 1,800 V that trips at 850 and 2,070 V: motoring ends half way to the lower one; braking ends at 0.6 of the way
+/// to the upper one and fades over half of that; the line's voltage ends motoring sooner.
 #[test]
 fn the_window_of_the_link_is_that_of_the_ratings_and_of_the_line() {
     let mut world = World::enabled();
