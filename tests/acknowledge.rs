@@ -1,6 +1,6 @@
 //! The acknowledge of a fault, in every order of acknowledge, fault, carrier boundary and control period, for both drives: the safe
-//! state is never entered without somebody who holds its fault, no pulses are made in it, and only an acknowledge that was given
-//! after a fault was told makes the drive forget it.
+//! state is never entered unless a side holds its fault, no pulses are made in it, and the drive forgets a fault only by an
+//! acknowledge that was given after the fault was reported.
 
 use std::cell::Cell;
 use tractive::built_in::{traction::BUILT_IN, zs9};
@@ -23,7 +23,7 @@ const CLOCK: Clock = Clock::new(25_000_000, 2_500);
 const OMEGA: f32 = 300.0;
 /// Control periods before anything happens: the speed is known and pulses are made.
 const SETTLED: u32 = 200;
-/// Control periods in which acknowledge and fault fall: more than a command takes to a boundary and its answer back.
+/// Control periods within which acknowledge and fault fall: more than a command needs to reach a boundary and its answer to come back.
 const WINDOW: u32 = 16;
 /// Control periods after that: both interrupts have agreed.
 const AGREED: u32 = 20;
@@ -49,7 +49,7 @@ struct Case {
 }
 
 impl Case {
-    /// Every order within the window, for so many phases between the timers, one control period apart in all.
+    /// Runs every order within the window, for so many phases between the timers, which span one control period in all.
     fn each(phases: u32, mut run: impl FnMut(&Self)) {
         let finders = [Finder::Control, Finder::Pwm, Finder::Hardware];
         for (phase, finder) in (0..phases).flat_map(|phase| finders.map(|finder| (phase, finder))) {

@@ -45,13 +45,13 @@ struct Fake {
     /// The number of times that the gates were let go, and whether something holds them.
     left: u32,
     held: bool,
-    /// Compare steps after a peak after which the board begins to look at the gates anew.
+    /// Delay after a peak, in compare steps, before the board begins to look at the gates anew.
     late_steps: u32,
     /// `true` if control asks the operator, who is told then.
     operated: bool,
 }
 
-/// The control task without its look at the voltage, which the currents of a fake do not follow.
+/// The control task without its check of the voltage, which the currents of a fake do not follow.
 fn control() -> ControlTask {
     ControlTask::new(&BUILT_IN, SETTINGS).without(MaskedFaults::of(Fault::VoltageUnexplained))
 }
@@ -379,7 +379,7 @@ fn speeds_are_known_once_both_are() {
     }
 }
 
-/// Every tenth period, from the first one on in which it was asked; a board of another's commands never.
+/// The operator is told in every tenth period, from the first one on in which it was asked; on a board that another one commands, never.
 #[test]
 fn the_operator_is_told_once_a_slot_and_only_where_it_commands() {
     for operated in [false, true] {
@@ -491,7 +491,7 @@ fn messages_arrive_as_they_were_sent() {
 /// The injury of a test to both interrupts' samples.
 type Spoiled = (Spoil, fn(&mut PowerSample));
 
-/// One fault stops both motors; an acknowledge with its cause gone lets both go on, with its cause there trips anew.
+/// One fault stops both motors. An acknowledge lets both go on if the cause is gone, and trips anew if it is there.
 #[test]
 fn a_fault_is_left_by_an_acknowledge_of_both_interrupts() {
     let cases: [Spoiled; 2] = [

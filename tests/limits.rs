@@ -1,4 +1,4 @@
-//! Limits of the protection to the last bit: which value is still allowed, which is the first that is not, and which fault is named where
+//! Limits of the protection to the last bit: the last value that is allowed, the first that is not, and the fault that is named if
 //! several limits are broken at once.
 
 use core::f32::consts::TAU;
@@ -34,7 +34,7 @@ fn least(limit: f32, fault: Fault, check: impl Fn(f32) -> Option<FailedCheck>) {
     assert_eq!(check(beyond), Some((fault, beyond, limit)));
 }
 
-/// Phase currents without a sum.
+/// Phase currents whose sum is zero.
 fn phases(a: f32) -> Abc {
     Abc { a, b: -a, c: 0.0 }
 }
@@ -67,7 +67,7 @@ fn currents_to_the_last_bit() {
     }
     assert!(check_currents(&in_phase[3](sum_a + 0.01), RATINGS).is_some());
     assert!(check_currents(&in_phase[3](sum_a - 0.01), RATINGS).is_none());
-    // A current at its limit is not what is wrong; beyond it, it is named before the sum.
+    // A current at its limit is no fault; beyond it, it is named before the sum.
     let at = Abc { a: trip_a, b: 0.0, c: 0.0 };
     assert_eq!(check_currents(&at, RATINGS), Some((Fault::PhaseSum, trip_a, sum_a)));
     let both = Abc { a: trip_a.next_up(), b: 0.0, c: 0.0 };
@@ -94,7 +94,7 @@ fn link_and_speed_to_the_last_bit() {
     assert_eq!(check_known(true), Some((Fault::PositionSensor, 0.0, 1.0)));
 }
 
-/// Each broken at once with all that follow: the first of the row is named.
+/// Each limit is broken at once with all that follow it: the first of the row is named.
 #[test]
 fn the_first_fault_is_named() {
     let (udc_v, omega) = (2.0 * RATINGS.trip_dc_over_v, 2.0 * RATINGS.trip_speed_rad_s * RATINGS.pole_pairs);
@@ -203,14 +203,14 @@ fn emf_v(omega: f32) -> f32 {
     omega.abs() * 3.0_f32.sqrt() * RATINGS.magnet_flux_wb
 }
 
-/// The first of some neighbouring numbers at which the EMF is just a voltage.
+/// The first of some neighbouring numbers at which the EMF is exactly a voltage.
 fn omega_of(emf: f32) -> Option<f32> {
     let about = emf / (3.0_f32.sqrt() * RATINGS.magnet_flux_wb);
     let first = about.to_bits() - 16;
     (first..first + 32).map(f32::from_bits).find(|omega| emf_v(*omega) == emf)
 }
 
-/// Link voltages below the nominal one, a volt apart, at which some speed makes just so much of their EMF.
+/// Link voltages below the nominal one, a volt apart, of which some speed makes exactly this share as its EMF.
 fn just(share: f32) -> Vec<(f32, f32)> {
     let volts = (500..1_500).map(|udc_v| udc_v as f32);
     let found: Vec<_> = volts.filter_map(|udc_v| Some((udc_v, omega_of(share * udc_v)?))).collect();
@@ -253,7 +253,7 @@ fn what_flows_through_the_diodes_to_the_last_bit() {
     let flowing_a = 0.05 * RATINGS.max_current_a;
     let (omega, udc_v) = (1_500.0, 1_500.0);
     // 0.15 rad a period: more than a turn after 42 of them.
-    // Of two phases at least; what one alone shows is its sensor's.
+    // At least two phases must show it; a current in one alone is its sensor's.
     for (current, shorted) in [
         ([1.0, -1.0, 0.0], Some(42)),
         ([0.0, 1.0, -1.0], Some(42)),
@@ -279,7 +279,7 @@ fn what_flows_through_the_diodes_to_the_last_bit() {
     }
 }
 
-/// A sensor that shows a current which is none does not short a machine that turns slowly, on an empty link either.
+/// A sensor that shows a current that does not flow shorts no slowly turning machine, not even on an empty link.
 #[test]
 fn an_empty_link_is_no_reason_to_short_a_slow_machine() {
     let (_, omega) = just(0.5).into_iter().find(|(udc_v, _)| *udc_v >= RATINGS.trip_dc_under_v).unwrap();
@@ -291,7 +291,7 @@ fn an_empty_link_is_no_reason_to_short_a_slow_machine() {
     }
 }
 
-/// Periods without current take back as much of the turn as they last; a machine that is shorted already is left alone.
+/// Periods without current take back as much of the counted turn as they last; a machine that is shorted already is left alone.
 #[test]
 fn a_pause_of_the_current_takes_back_what_it_lasts() {
     let open =
@@ -307,7 +307,7 @@ fn a_pause_of_the_current_takes_back_what_it_lasts() {
     assert!((0..41).all(|_| step(50.0, SafeState::GatesOff).is_none()));
 }
 
-/// Of a current that is held a sensor which fails hides no more than the zero crossings of the other two, whichever it is and whatever it shows.
+/// A failed sensor, whichever it is and whatever it shows, hides no more of a held current than the zero crossings of the other two.
 #[test]
 fn a_sensor_that_fails_does_not_hide_a_current_that_stays() {
     const PERIODS_A_TURN: f32 = 42.0;
@@ -329,8 +329,8 @@ fn a_sensor_that_fails_does_not_hide_a_current_that_stays() {
     }
 }
 
-/// The number of periods that a watch takes for these currents and this voltage, of a rotor whose angle `turns` or stands, once the voltage
-/// has been `before_v`.
+/// Periods that a watch takes for these currents and this voltage, with a rotor whose angle `turns` or stands, after the voltage has been
+/// `before_v`.
 fn frozen_after(
     a: f32,
     (before_v, voltage_v): (f32, f32),
@@ -356,7 +356,7 @@ fn frozen_after(
 }
 
 /// An angle that stands is a fault once the rotor should have turned by 0.2 rad, at a speed that fades by a part in 200 a period: at 20 rad/s
-/// after 139 of them, by 20 · 0.02 · (1 − 0.995ⁿ). The sum has its limit at 10 rad/s.
+/// after 139 periods, by 20 · 0.02 · (1 − 0.995ⁿ). At 10 rad/s the limit of the sum is just that angle.
 #[test]
 fn an_angle_that_stands_is_found_in_its_time() {
     for (omega, periods) in
@@ -440,7 +440,7 @@ fn a_trip_comes_back_from_its_words() {
         );
         assert_eq!(trip_from_words(words), Some(trip));
         assert_eq!((trip.to_words(), Trip::from_words(words)), (words, trip));
-        // What lies beyond the two bytes is none of it.
+        // Anything beyond the two bytes is not part of it.
         let [code, rest @ ..] = words;
         let [value, limit, at] = rest;
         assert_eq!(trip_from_words([code | 0xABCD_0000, value, limit, at]), Some(trip));
@@ -458,8 +458,8 @@ fn a_trip_comes_back_from_its_words() {
     }
 }
 
-/// A demand that is this share of the most torque at 4,000 r/min and 1,000 V, before a machine that gives a tenth more than the map: the
-/// torque that is aimed at after a second, over the most.
+/// The torque that is aimed at after a second, over the largest at 4,000 r/min and 1,000 V, for a demand of this share of the largest
+/// and a machine that gives a tenth more than its map.
 fn aimed_share(share: f32) -> f32 {
     let (tables, clock) = (&BUILT_IN, Clock::new(25_000_000, 2_500));
     let law = Law { gains: &Gains::DEFAULT, clock: &clock, tables };
@@ -486,8 +486,8 @@ fn aimed_share(share: f32) -> f32 {
     controller.target().torque_nm / most_nm
 }
 
-/// A machine that gives more torque than its map is not asked for less where the demand is beyond what there is: there the crests of the ripple
-/// alone would take the torque down until the limit seemed kept.
+/// A machine that gives more torque than its map is not asked for less if the demand exceeds the available torque: otherwise the crests of the
+/// ripple alone would take the torque down until the limit seemed kept.
 #[test]
 fn a_demand_beyond_the_limit_is_not_trimmed_down() {
     for share in [1.01, 1.5] {

@@ -100,7 +100,7 @@ impl Seen {
         self.stretches.iter().map(|s| s.legs.iter().filter(|leg| **leg == 2).count()).max().unwrap_or(0)
     }
 
-    /// Time of each active vector: those that are not the same state three times over, and not shorted.
+    /// Time of each active vector: those whose three states are not all the same, and not shorted.
     fn dwells(&self) -> BTreeMap<[i32; 3], f64> {
         let mut dwells = BTreeMap::new();
         for stretch in &self.stretches {
@@ -198,7 +198,7 @@ fn phases(angle_deg: f64) -> [f64; 3] {
     [0.0, 120.0, 240.0].map(|shift| (angle_deg - shift).to_radians().cos())
 }
 
-/// Largest less smallest phase of the unit vector.
+/// Largest minus smallest phase of the unit vector.
 fn span(angle_deg: f64) -> f64 {
     let phases = phases(angle_deg);
     phases.into_iter().fold(f64::MIN, f64::max) - phases.into_iter().fold(f64::MAX, f64::min)
@@ -429,7 +429,7 @@ fn the_sliding_boundary_shares_what_the_fixed_one_leaves() {
             );
             assert_eq!(worst(Scheme::Rthd, duty, depth1, depth2).applied.feasible(), part == 0.5);
         }
-        // One motor may want too much; the other keeps what is its own, and the first has the rest.
+        // One motor may want too much; the other keeps its own share, and the first has the rest.
         let applied = worst(Scheme::RthdSlide, duty, 5.0, 0.3 * sum).applied;
         assert!(applied.upper_limited && !applied.lower_limited);
         assert!((f64::from(applied.upper_index) - 0.7 * sum).abs() < 2e-6);

@@ -1,5 +1,5 @@
-//! Interrupts that are late or lost, in both drives: each side notices what the other one misses, by its first interrupt that can, and
-//! turns the gates off in it. Instants here are real ones; the tasks count theirs, and fall behind with every interrupt they miss.
+//! Late or lost interrupts, in both drives: each side notices, in its first interrupt that can, what the other one misses, and turns
+//! the gates off in it. Instants here are real ones; the tasks count their own, and fall behind with every interrupt that they miss.
 
 use tractive::built_in::{traction::BUILT_IN, zs9};
 use tractive::control::Demand;
@@ -251,7 +251,7 @@ fn traction(injected: InjectedFault) -> (Option<Trip>, Option<u32>, u32) {
 fn zs9(injected: InjectedFault, carrier_ticks: u32) -> (Option<Trip>, Option<u32>) {
     let settings = dual::Settings::new(CLOCK, carrier_ticks, &zs9::BUILT_IN);
     let shared = dual::Shared::new();
-    // What the gates and the currents do is not played here.
+    // The behaviour of gates and currents is not simulated here.
     let [stuck, unexplained] = [Fault::LegStuck, Fault::VoltageUnexplained].map(MaskedFaults::of);
     let mut control = dual::ControlTask::new(&zs9::BUILT_IN, settings).without(unexplained);
     let mut pwm = dual::PwmTask::new(&zs9::BUILT_IN, settings).without(stuck);
@@ -271,7 +271,7 @@ fn zs9(injected: InjectedFault, carrier_ticks: u32) -> (Option<Trip>, Option<u32
             _ => {}
         }
     }
-    // What the PWM interrupt tripped on, control reports as well, if it comes at all.
+    // Control also reports what the PWM interrupt tripped on, if control comes at all.
     let gone = matches!(injected, InjectedFault::ControlLost(count) if count > 10);
     assert!(gone || board.trip.is_some() || pwm.trip().is_none(), "{injected:?} is not reported");
     let plays_on = matches!(injected, InjectedFault::PwmLost(count) if count > 10);
@@ -280,7 +280,7 @@ fn zs9(injected: InjectedFault, carrier_ticks: u32) -> (Option<Trip>, Option<u32
     (board.trip.or(pwm.trip()), board.entered)
 }
 
-/// The injected fault is told by this name, and the gates are off within this many ticks of its instant.
+/// The injected fault is reported by this name, and the gates are off within this many ticks of its instant.
 fn both_trip(injected: InjectedFault, fault: Fault, within: u32) {
     let (trip, entered, longest) = traction(injected);
     assert_eq!(trip.map(|trip| trip.fault), Some(fault), "{injected:?}");
@@ -330,8 +330,8 @@ fn a_late_control_interrupt_notices_itself() {
     }
 }
 
-/// A PWM interrupt has time until the next boundary. What comes before the next control interrupt changes nothing; later than a quarter
-/// of a control period, with control in between, it counts as lost.
+/// A PWM interrupt has time until the next boundary. If it comes before the next control interrupt, nothing changes; if it is later
+/// than a quarter of a control period, with control in between, it counts as lost.
 #[test]
 fn a_delayed_pwm_interrupt_is_noticed_by_the_control_interrupt() {
     let (trip, entered, _) = traction(InjectedFault::PwmLate(400));
@@ -351,7 +351,7 @@ fn a_delayed_pwm_interrupt_is_noticed_by_the_control_interrupt() {
     }
 }
 
-/// A board in whose control interrupt the PWM interrupt lands once: behind its samples.
+/// A board whose control interrupt is once interrupted by the PWM interrupt, after its samples.
 struct Landing<'a> {
     board: Board,
     pwm: Option<&'a mut traction::PwmTask>,
@@ -383,7 +383,7 @@ impl ControlPort for Landing<'_> {
     }
 }
 
-/// The view of control is that of its instant: before the first boundary there was nothing, and nothing is not late.
+/// Control judges by its own instant: before the first boundary there was nothing, and so nothing was late.
 #[test]
 fn the_first_boundary_may_land_in_a_control_interrupt() {
     let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
@@ -404,8 +404,8 @@ fn the_first_boundary_may_land_in_a_control_interrupt() {
     }
 }
 
-/// A drive that has pulsed for a while, and in whose control interrupt at [`SETTLED`] the boundary lands that comes so many ticks after its
-/// beginning, before it has planned anything: the trip that control reports in the end, that of the PWM interrupt, and when the gates went off.
+/// A drive that has pulsed for a while. During its control interrupt at [`SETTLED`], before it has planned anything, comes the boundary that lies so many
+/// ticks after the interrupt's beginning. Returns the trip that control reports in the end, that of the PWM interrupt, and when the gates went off.
 fn boundary_within_control(after_ticks: u32) -> (Option<Trip>, Option<Trip>, Option<u32>) {
     let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
     let settings = traction::Settings::new(CLOCK, devices);
@@ -440,8 +440,8 @@ fn boundary_within_control(after_ticks: u32) -> (Option<Trip>, Option<Trip>, Opt
     (board.trip, pwm.trip(), board.entered)
 }
 
-/// The half for a boundary is planned a control period ahead. Where control has begun in time but lasts until that boundary, the PWM
-/// interrupt finds nothing for it: it says so by name, and the gates are off at once.
+/// The half for a boundary is planned a control period ahead. If control begins in time but lasts until that boundary, the PWM
+/// interrupt finds no half for it: it says so by name, and the gates are off at once.
 #[test]
 fn a_half_that_is_not_there_at_its_boundary_is_a_fault() {
     let period = CLOCK.control_ticks;

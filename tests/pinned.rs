@@ -1,5 +1,5 @@
-//! Outputs of both control laws, over random walks of every input, and of the drive through all its modes, pinned bit for bit: what changes
-//! one changes a line of a file in `tests/pinned/`. Whoever means to change it writes the file anew, `TRACTIVE_PINNED=write`, and says what the change buys.
+//! Outputs of both control laws, over random walks of every input, and of the drive through all its modes, pinned bit for bit: a change of any output
+//! changes a line of a file in `tests/pinned/`. For an intended change, write the file anew with `TRACTIVE_PINNED=write`, and say what the change buys.
 
 #[path = "pinned/file.rs"]
 mod file;

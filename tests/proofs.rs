@@ -1,5 +1,5 @@
-//! Proofs by all values of so few bits: instants, angles, frames, checksums, compare values, legs. `docs/proof.md` lists what
-//! each one proves, and where its bound is; those of what is not public stand beside it.
+//! Proofs that try all values of a few bits: instants, angles, frames, checksums, compare values, legs. `docs/proof.md` lists
+//! what each one proves, and its bound; proofs of code that is not public stand beside that code.
 
 use std::ops::Range;
 use std::thread;
@@ -63,7 +63,7 @@ fn an_angle_is_its_own_short_way_round() {
     });
 }
 
-/// Minutes of a core.
+/// Takes minutes of a core.
 #[test]
 #[ignore = "every angle: two minutes; --include-ignored"]
 fn sine_and_cosine_of_every_angle_are_within_their_bound() {
@@ -83,23 +83,23 @@ fn sine_and_cosine_of_every_angle_are_within_their_bound() {
 /// The places of the counter's bits.
 const COUNTER: Range<u32> = 48..52;
 
-/// The CRC is linear, and the counter chooses what is added to it: so what is found in one frame is found in each with that counter.
+/// The CRC is linear, and the counter selects the term that is added to it: a result for one frame holds for each frame with that counter.
 #[test]
 fn up_to_three_wrong_bits_and_every_burst_of_eight_are_found() {
     let ids = data_ids(7);
     for counter in 0..16 {
         let mut sound = [0x5A, 0, 0xC3, 0x0F, 0xFF, 0, 0x81, 0x18];
         protect(&mut sound, counter, &ids);
-        // In the order in which the bits are sent: bursts are of neighbours.
+        // In the order in which the bits are sent: a burst hits neighbours.
         let number = u64::from_be_bytes(sound);
         let intact = |pattern: u64| is_intact(&(number ^ pattern).to_be_bytes(), &ids);
         assert!(intact(0));
-        // A wrong counter is another frame's, and judged by its place in the sequence.
+        // A wrong counter belongs to another frame, and is judged by its place in the sequence.
         let bits: Vec<u32> = (0..64).filter(|bit| !COUNTER.contains(bit)).collect();
         for (first, a) in bits.iter().enumerate() {
             for (second, b) in bits.iter().enumerate().skip(first) {
                 for c in bits.iter().skip(second) {
-                    // Twice the same bit stands for fewer wrong bits.
+                    // The same bit twice stands for fewer wrong bits.
                     let pattern = 1_u64 << a | 1 << b | 1 << c;
                     assert!(!intact(pattern), "{a} {b} {c}");
                 }
@@ -113,7 +113,7 @@ fn up_to_three_wrong_bits_and_every_burst_of_eight_are_found() {
     }
 }
 
-/// Each content that is decoded is encoded as it came: of each value of a signal, beside others that are in their range.
+/// Each content that decodes is encoded again unchanged: for each value of a signal, beside others that are in their range.
 #[test]
 fn every_word_of_a_command_comes_back_as_it_was() {
     let comes_back = |payload: Payload| {
@@ -168,7 +168,7 @@ fn every_word_of_the_limits_comes_back_as_it_was() {
     assert!(taken.iter().all(|taken| *taken > 60_000), "{taken:?}");
 }
 
-/// Every word of 16 bits in each place of a content, beside what is good: what is decoded is encoded as it came. How many were.
+/// Tries every word of 16 bits in each place of an otherwise good content: what decodes is encoded again unchanged. Returns how many decoded.
 fn every_word(good: Payload, again: impl Fn(Payload) -> Option<Option<Payload>>) -> [usize; 3] {
     [16, 32, 48].map(|shift| {
         let comes_back = |word: &u64| {
@@ -207,13 +207,13 @@ fn every_word_of_a_parameter_request_comes_back_as_it_was() {
     assert_eq!(every_word(write, again), [256, 65_536, 65_280]);
 }
 
-/// The length of the shortest edge's distance from an end of its half: a pulse spans two halves, so a half may hold half the shortest one.
+/// The shortest distance of an edge from an end of its half: a pulse spans two halves, so a half may hold half the shortest pulse.
 const fn shortest_ticks(devices: &SwitchLimits) -> u32 {
     devices.min_pulse_ticks.div_ceil(2)
 }
 
-/// Each edge stands within its half, or at its beginning; at the half's end or as far behind it as there are numbers there is none. Counts
-/// edges that are as near to an end as they may be.
+/// Checks that each edge stands within its half or at its beginning; a compare at the half's end or anywhere behind it means that there is
+/// none. Counts edges that are as near to an end as they may be.
 fn at_the_border(half: &CarrierHalf, devices: &SwitchLimits) -> usize {
     let (shortest, period) = (shortest_ticks(devices), half.period_ticks);
     let edges = half.compare_ticks.into_iter().filter(|compare| (1..period).contains(compare));
@@ -223,7 +223,7 @@ fn at_the_border(half: &CarrierHalf, devices: &SwitchLimits) -> usize {
     edges.filter(|edge| [far.start(), far.end()].contains(&edge)).count()
 }
 
-/// The free carrier at every angle of 16 bits, from no voltage to more than there is.
+/// The free carrier at every angle of 16 bits, from no voltage to more than is available.
 #[test]
 fn compare_values_are_within_their_half() {
     let devices = SwitchLimits::new(250, 75, 900.0, &CLOCK);
@@ -240,8 +240,8 @@ fn compare_values_are_within_their_half() {
     assert!(border > 10_000, "{border} at the border");
 }
 
-/// Every mode, with the feature `optimal` the optimised patterns among them, for two turns either way from 64 angles, at five frequencies
-/// and twelve voltages: where each half begins, the turn decides.
+/// Every mode (with the feature `optimal` the optimised patterns too), for two turns either way from 64 angles, at five frequencies and
+/// twelve voltages: the turn decides where each half begins.
 #[test]
 fn compare_values_are_within_their_half_in_every_mode() {
     let devices = SwitchLimits::new(250, 75, 900.0, &CLOCK);
@@ -296,7 +296,7 @@ fn pauses([la, lb, ma, mb, ha, hb]: [u32; 6]) -> [GateTicks; 3] {
     [(la, lb), (ma, mb), (ha, hb)].map(|(off_from, off_to)| GateTicks { off_from, off_to })
 }
 
-/// Pauses that are in order make a legal leg, and those that overlap do not: so legality is their order.
+/// Pauses in order make a legal leg, and overlapping ones do not: so legality is their order.
 #[test]
 fn a_leg_is_legal_where_its_pauses_are_apart() {
     let (mut apart, mut together) = (0, 0);
@@ -315,8 +315,8 @@ fn a_leg_is_legal_where_its_pauses_are_apart() {
     assert!(apart == 3_003 && together > 100, "{apart} {together}");
 }
 
-/// Every leg of a half of eight ticks, with every move of its two borders by up to eight: what compensates the dead time only compares,
-/// adds and halves, so that there is nothing in a longer half that is not in this one.
+/// Every leg of a half of eight ticks, with every move of its two borders by up to eight: the compensation of dead time only compares,
+/// adds and halves, so that a longer half holds nothing that this one does not.
 #[test]
 fn compensated_legs_stay_legal_and_short_nothing_for_longer() {
     let small_a = 8.0;
@@ -373,7 +373,7 @@ fn compensated_edges_come_earlier_by_the_dead_time_at_most() {
                     (compare.saturating_sub(most)..=compare).contains(&found),
                     "{before:?} {current} {found}"
                 );
-                // All of it from the small current on; of one that is not finite, which is a fault, it is only within its limits.
+                // From the small current on, all of it; for a current that is not finite, which is a fault, it only stays within its limits.
                 assert!(
                     against < small_a || against.is_infinite() || found == compare.saturating_sub(most),
                     "{before:?} {current} {found}"

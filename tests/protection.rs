@@ -28,7 +28,7 @@ struct Fake {
     report: Report,
     /// The sample that the PWM interrupt gets instead, and its time.
     pwm_currents: Option<(Abc, core::ops::Range<u32>)>,
-    /// From when on nothing is spoilt any more.
+    /// Instant from which nothing is spoilt any more.
     spoil_until: u32,
     /// The operator acknowledges from this instant on.
     acknowledge_from: u32,
@@ -40,7 +40,7 @@ struct Fake {
     faults: Vec<(Option<Fault>, u32)>,
     /// The last half with pulses.
     pulsed: u32,
-    /// From when on halves are loaded too late, and when the last one was.
+    /// Instant from which halves are loaded too late, and that of the last one.
     late_from: u32,
     played_at: Instant,
 }
@@ -179,7 +179,7 @@ fn drive(fake: &mut Fake, end: u32, control_until: u32) -> Option<Trip> {
     driven(fake, &mut control, end, control_until)
 }
 
-/// The same with a control task of one's own.
+/// The same with a given control task.
 fn driven(fake: &mut Fake, control: &mut ControlTask, end: u32, control_until: u32) -> Option<Trip> {
     let devices = SwitchLimits::new(250, 0, 900.0, &CLOCK);
     let shared = Shared::new();
@@ -378,7 +378,7 @@ fn the_safe_state_follows_the_emf() {
     assert_eq!(tractive::protection::safe_state(1300.0, 1000.0, &BUILT_IN.ratings), SafeState::ShortCircuit);
 }
 
-/// Gates off and `current` through phases u and w, at so much of the rule's speed: the time until the watch asks for another state, in turns.
+/// Turns until the watch asks for another state, with gates off and `current` through phases u and w, at this share of the rule's speed.
 fn watched(current: f32, share: f32, legs: LegFaults) -> Option<(SafeState, f32)> {
     let ratings = &BUILT_IN.ratings;
     let omega = share * 1_500.0 / (3.0_f32.sqrt() * ratings.magnet_flux_wb);
@@ -411,13 +411,13 @@ fn gates_off_become_a_short_circuit_where_current_stays() {
     }
 }
 
-/// A leg whose one driver blocks has the other device conducting: that one's rail is safe at every speed. Bits uh ul vh vl wh wl.
+/// A leg with one blocked driver conducts by its other device: that device's rail is safe at every speed. Bits uh ul vh vl wh wl.
 #[test]
 fn a_short_circuit_of_devices_decides_the_rail() {
     const UPPER: SafeState = SafeState::UpperShortCircuit;
     const LOWER: SafeState = SafeState::ShortCircuit;
     const OFF: SafeState = SafeState::GatesOff;
-    // Slow; so fast that the diodes rectify; so fast that the link does not stand it.
+    // Slow; so fast that the diodes rectify; so fast that the link does not withstand it.
     let omegas = [500.0, 1_900.0, 2_900.0];
     for (blocked, low, high, safe) in [
         (0, 0, 0, [OFF, LOWER, LOWER]),

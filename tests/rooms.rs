@@ -1,5 +1,5 @@
-//! The rooms of every crate, its modules right below the root: none imports what imports it; and of the rig no module of any depth
-//! does. Control and modulation know neither each other nor the nine-switch.
+//! The rooms of every crate, its modules right below the root: none imports one that imports it, and in the rig no module of any
+//! depth does. Control and modulation know neither each other nor the nine-switch.
 //!
 //! Every path of every file is read: `use` trees with their braces, and paths in the code and in macros, from `crate`, `super`, `self`
 //! or a child. A name that a module only hands on (`pub use`) counts as an import of where it is defined.
@@ -18,7 +18,7 @@ type Imports = BTreeMap<Module, BTreeSet<Module>>;
 struct Source {
     paths: Vec<Vec<String>>,
     handed_on: BTreeMap<String, Vec<String>>,
-    /// Modules of which everything is taken that they hand on.
+    /// Modules from which everything that they hand on is taken.
     globs: Vec<Vec<String>>,
 }
 
@@ -54,7 +54,7 @@ impl Source {
         let mut at = 0;
         while at < tokens.len() {
             match &tokens[at] {
-                // What is only compiled for tests may look wherever it likes.
+                // Code that is only compiled for tests may look wherever it likes.
                 TokenTree::Group(group) if group.to_string().replace(' ', "") == "[cfg(test)]" => {
                     let is_block = |token: &TokenTree| matches!(token, TokenTree::Group(group) if group.delimiter() == Delimiter::Brace);
                     at += tokens[at..].iter().position(is_block).unwrap_or(0);
@@ -163,7 +163,7 @@ fn of_rooms(imports: &Imports) -> Imports {
     rooms
 }
 
-/// The rest when those are taken away, again and again, that import nothing of what is left: the cycles, and who imports them.
+/// The modules left after those that import nothing of the rest are taken away again and again: the cycles, and their importers.
 fn cyclic(mut imports: Imports) -> Imports {
     loop {
         let left: BTreeSet<_> = imports.keys().cloned().collect();

@@ -183,7 +183,7 @@ fn weakening_keeps_torque_flux_and_the_current_limit() {
     assert!(current < most, "current {current} A");
 }
 
-/// More torque on the smooth map than the table's limit, on or inside a circle, must not be there to find.
+/// No torque above the table's limit may be found on the smooth map, on or inside a circle.
 #[test]
 fn the_limit_is_all_the_torque_there_is() {
     let judge = Judge::new();

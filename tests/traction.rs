@@ -1,4 +1,4 @@
-//! The traction drive with one thing out of the ordinary: a motor that turns steadily, and a setting, a sample or a command that another drive has not.
+//! The traction drive with one thing out of the ordinary: a motor that turns steadily, and a setting, a sample or a command that other drives do not have.
 
 use std::f32::consts::TAU;
 use tractive::built_in::traction::BUILT_IN;
@@ -70,7 +70,7 @@ impl<'a> Motor<'a> {
         }
     }
 
-    /// Both interrupts in their order until an instant; control comes no more from another one on. Returns the trip.
+    /// Runs both interrupts in their order until an instant; from another one on, control no longer comes. Returns the trip.
     fn drive(&mut self, settings: Settings, shared: &Shared, end: u32, lost: u32) -> Option<Trip> {
         let first = Instant(settings.devices.shortest_half_ticks);
         let mut pwm = PwmTask::new(&BUILT_IN, settings, first);
@@ -233,7 +233,7 @@ fn a_machine_whose_temperatures_are_no_longer_known_is_as_rated() {
         assert_eq!(motor.runs(settings(900.0), end), None);
         Dq { d: motor.report.id_a, q: motor.report.iq_a }
     };
-    // By how much a warm machine's reference is another one than a cold machine's: hardly, as its voltage alone is another one.
+    // Difference of a warm machine's reference from a cold machine's: hardly any, as only its voltage differs.
     let apart = |end| (current(&warm, end) - current(&cold, end)).length();
     let [before, warm, after] = [WARM.start, WARM.start + SETTLED / 8, WARM.end + 2 * SETTLED].map(apart);
     assert!(before == 0.0 && warm > 1e-3 && after < 1e-3, "{before} {warm} {after}");
@@ -260,8 +260,8 @@ fn a_link_that_swings_is_damped_by_torque_where_it_is_wanted() {
     assert!(without < 0.1 && with > 2.0, "{without} N·m without, {with} N·m with");
 }
 
-/// The start of a sensor that only counts: a pulse takes as many commands as its volt-seconds need at the largest voltage, which also what the halves before have made
-/// too much does not pass.
+/// The start of a sensor that only counts: a pulse takes as many commands as its volt-seconds need at the largest voltage. Making up for what earlier
+/// halves made too much does not exceed that voltage either.
 #[test]
 fn pulses_of_the_start_keep_within_the_largest_voltage_of_a_carrier() {
     let quick = settings(9_000.0);

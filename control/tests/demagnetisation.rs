@@ -111,7 +111,7 @@ fn id_a(tables: &Tables, flux: Dq) -> f32 {
     halved(flux.d, (-400.0, 100.0), |d| flux_linkage(tables, Dq { d, q: q_of(d) }).d)
 }
 
-/// The least i_d of current and flux references at a speed, torque turned over from one sign to the other again and again.
+/// The least i_d of current and flux references at a speed, with torque reversed from one sign to the other again and again.
 fn least_of_references<L: ControlLaw>(
     law: &mut L,
     tables: &Tables,
@@ -125,7 +125,7 @@ fn least_of_references<L: ControlLaw>(
     for period in 0..12_000_u16 {
         let angle = Angle::from_turns(omega / std::f32::consts::TAU * 1e-4 * f32::from(period));
         law.track(angle, &clock);
-        // The link falls as the torque turns over: the circle gets narrower while the reference is still on its way.
+        // The link falls as the torque is reversed: the circle gets narrower while the reference is still on its way.
         let (wanted_nm, udc_v) =
             [(1_235.0, 1_500.0), (0.0, 1_020.0), (-1_235.0, 1_500.0)][usize::from(period / 2_000 % 3)];
         let flowing = law.target().current;

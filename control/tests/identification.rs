@@ -11,7 +11,7 @@ use tractive_control::machine::Tables;
 use tractive_control::time::Clock;
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
-/// A machine behind an ideal inverter whose voltage is that of the command before; its rotor is free.
+/// A machine behind an ideal inverter whose voltage is that of the previous command; its rotor is free.
 struct Plant {
     map: SmoothMap,
     flux_scale: f64,
@@ -109,7 +109,7 @@ impl Plant {
     }
 }
 
-/// Largest current beyond the bound, as a share, and the largest mechanical turn before the rotor is to turn, in degrees.
+/// Largest current beyond the bound, as a share, and the largest mechanical turn before the rotor is meant to turn, in degrees.
 struct Outcome {
     peak: f64,
     turned_deg: f64,
@@ -171,8 +171,8 @@ fn run(machine: &Machine, flux_scale: f64, sensors: Sensors) -> Outcome {
     outcome
 }
 
-/// The reach of the pulses along q, to one side at least, as the map is even: in the band along d where it is least, as a share of the
-/// circle that the boundaries keep to.
+/// Reach of the pulses along q, to one side at least, as the map is even: that of the band along d where it is least, as a share of
+/// the circle that the boundaries keep to.
 fn reach(observations: &[Observation], bound_a: f64) -> f64 {
     let of_band = |band: i32| {
         let middle = 0.1 * f64::from(band) * bound_a;
@@ -229,7 +229,7 @@ fn the_current_keeps_to_its_bound_and_the_rotor_to_its_place() {
     }
 }
 
-/// Currents along what the angle says is d turn such a rotor: it is taken back.
+/// Currents along the supposed d axis turn such a rotor: it is brought back.
 #[test]
 fn a_free_rotor_keeps_its_place_where_the_angles_zero_is_off() {
     for machine in &*MACHINES {
@@ -245,7 +245,7 @@ fn a_free_rotor_keeps_its_place_where_the_angles_zero_is_off() {
     }
 }
 
-/// Sensors of the wrong sign or order: the experiment ends before a current flows that counts.
+/// Sensors of the wrong sign or order: the experiment ends before any considerable current flows.
 #[test]
 fn currents_that_answer_against_the_voltage_end_the_experiment() {
     type Reads = fn(Abc) -> Abc;

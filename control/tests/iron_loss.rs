@@ -1,4 +1,4 @@
-//! A machine's known iron loss in the control law: the air gap gives as much more as the iron takes, so that torque is the rotor's.
+//! A machine's known iron loss in the control law: the air gap gives as much more torque as the iron takes, so that the torque is the rotor's.
 
 use std::path::Path;
 use tractive_control::control::{

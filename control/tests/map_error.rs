@@ -1,4 +1,4 @@
-//! The difference of machine and link from what they are taken for: found by the control law in front of such a machine, and made use of.
+//! The deviation of machine and link from their assumed values: found by the control law that drives such a machine, and made use of.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -34,7 +34,7 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
     MachineFolder::read(&folder).unwrap().tables()
 });
 
-/// A drive in front of a machine that has whatever current is aimed at.
+/// A drive with a machine whose current is always the reference.
 struct Run {
     law: Controller,
     tables: &'static Tables,
@@ -72,7 +72,7 @@ impl Run {
         }
     }
 
-    /// So many seconds at a speed in rad/s with a torque in N·m asked for; a carrier half is five control periods.
+    /// Drives so many seconds at a speed in rad/s with a torque demand in N·m; a carrier half is five control periods.
     fn drive(&mut self, omega: f32, torque_nm: f32, seconds: f32) {
         let demand = Demand { torque_nm, slew_limited: true };
         let constants = Law { gains: &Gains::DEFAULT, clock: &self.clock, tables: self.tables };
@@ -112,7 +112,7 @@ impl Run {
         torque_nm(self.tables, self.off.flux(flux_linkage(self.tables, current)), current)
     }
 
-    /// By how much the torque that is told is off, as a share of the largest.
+    /// Error of the reported torque, as a share of the largest.
     fn told_off(&self) -> f32 {
         (self.law.flowing_nm() - self.torque_nm()) / self.tables.ratings.max_torque_nm
     }
@@ -128,7 +128,7 @@ fn driven(off: Off, omega: f32, torque_nm: f32) -> Run {
     run
 }
 
-/// Three unknowns of two components: what tells them apart is what was seen at other torques.
+/// Three unknowns from two components: observations at other torques tell them apart.
 #[test]
 fn torque_is_known_whatever_is_off() {
     for (omega, torque_nm) in [(84.0, 900.0), (170.0, 900.0), (-170.0, -600.0), (500.0, 400.0)] {
@@ -150,7 +150,7 @@ fn torque_is_known_whatever_is_off() {
     }
 }
 
-/// Iron across the magnets is none of the three, but at each operating point two of them make it.
+/// An error of the iron across the magnets is none of the three, but at each operating point two of them reproduce it.
 #[test]
 fn iron_that_is_off_is_known_as_far_as_two_others_make_it() {
     for across in [0.1, -0.1] {
@@ -207,7 +207,7 @@ fn a_machine_and_a_link_without_an_error_are_used_as_they_are() {
     }
 }
 
-/// The loop's volt-seconds and the torque: all of an error that a link sensor may have is its own, of twice as much nothing.
+/// The loop's volt-seconds and the torque: an error that a link sensor may have is wholly ascribed to it, and nothing of an error twice as large.
 #[test]
 fn what_a_link_sensor_may_be_off_is_its_own_and_far_beyond_the_maps() {
     for (share, links, torque) in
@@ -218,13 +218,13 @@ fn what_a_link_sensor_may_be_off_is_its_own_and_far_beyond_the_maps() {
         assert!((scale - 1.0).abs() < 3e-3, "{share}: link {}", run.law.link_scale());
         let made = run.torque_nm() / 900.0 / (1.0 + share);
         assert!((made * (1.0 + torque) - 1.0).abs() < 6e-3, "{made} for {share}");
-        // What is told believes the same.
+        // The reported torque agrees.
         let told = run.law.flowing_nm() / run.torque_nm() * (1.0 + share) / (1.0 + torque) - 1.0;
         assert!(told.abs() < 6e-3, "{told} for {share}");
     }
 }
 
-/// A voltage that the dead time may take says nothing of the magnets, and what its edges may turn says nothing of the link.
+/// A voltage that the dead time may take says nothing about the magnets, and a turn that its edges may cause says nothing about the link.
 #[test]
 fn what_a_dead_time_may_look_like_is_left_alone() {
     let dead = DeadTime { voltage_v: 6.75, left_share: 0.2, time_s: 5e-6 };
@@ -246,7 +246,7 @@ fn what_a_dead_time_may_look_like_is_left_alone() {
     assert!(with == 1.0 && (without - 0.99).abs() < 1e-3, "{with}, {without}");
 }
 
-/// A winding that is as warm as is told is no error, from the start or while it drives.
+/// A winding that is as warm as reported is no error, from the start or while it drives.
 #[test]
 fn a_resistance_that_is_told_is_no_error() {
     let more = |run: &Run, ratio: f32| (ratio - 1.0) * run.tables.ratings.stator_resistance_ohm;
@@ -264,7 +264,7 @@ fn a_resistance_that_is_told_is_no_error() {
     }
 }
 
-/// Errors that a fast rotor has shown stay known where the dead time takes much of the EMF, with a current and without.
+/// Errors found with a fast rotor stay known where the dead time takes much of the EMF, with a current and without.
 #[test]
 fn what_is_known_stays_where_a_dead_time_hides_it() {
     for (wb, omega) in [(-0.08, 60.0), (-0.08, 30.0), (0.05, 60.0)] {
@@ -284,7 +284,7 @@ fn what_is_known_stays_where_a_dead_time_hides_it() {
     }
 }
 
-/// At standstill a constant current shows the resistance alone; it is known then when the rotor turns, and what the EMF shows is the flux linkage's.
+/// At standstill a constant current shows the resistance alone; it is known once the rotor turns, and the error in the EMF is the flux linkage's.
 #[test]
 fn a_standing_rotor_shows_the_resistance() {
     let off = Off { ohm: 0.05, wb: -0.045, ..AS_RATED };
@@ -300,7 +300,7 @@ fn a_standing_rotor_shows_the_resistance() {
     assert!(stood < 0.5 * not, "{stood} of the largest torque, {not} without");
 }
 
-/// A mean that is hardly likely, as an inverter or a link with a fault has it, moves what is known no further than a likely one: 33 % of torque otherwise.
+/// An unlikely mean, as an inverter or a link with a fault gives it, moves the known error no further than a likely one: 33 % of torque otherwise.
 #[test]
 fn a_voltage_that_is_hardly_likely_teaches_no_more_than_one_that_is() {
     let mut run = Run::new(AS_RATED);

@@ -1,4 +1,4 @@
-//! The angle of a rotor that stands, from pulses of halves that are no whole number to a command: its axis, its poles, and none where there are none.
+//! The angle of a rotor at rest, from pulses whose commands have no whole number of halves: its axis, its poles, and none where there are none.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -9,8 +9,8 @@ use tractive_tablegen::MachineFolder;
 
 const HALF_S: f32 = 50e-6;
 
-/// Commands after which a command has two halves and not one, or one and not two: of pulses of three commands, in twelve directions of four pulses, every other
-/// command; those of every other quarter turn, so that the longer ones have an axis; those of every other half turn, so that they have a side.
+/// Commands after which a command's halves change from one to two, or from two to one. Pulses have three commands, in twelve directions of four pulses: every
+/// other command; those of every other quarter turn, so that the longer pulses have an axis; those of every other half turn, so that they have a side.
 const MIXED: usize = 1;
 const BY_AXIS: usize = 36;
 const BY_SIDE: usize = 72;
@@ -88,7 +88,8 @@ fn pulse_wb(tables: &Tables) -> f32 {
     at(0.0) - at(-PULSE_SHARE * tables.ratings.max_current_a)
 }
 
-/// Each command makes up for what the halves before it have made of theirs: no pulse is longer than the longest command makes one, and saturation shows the poles.
+/// Each command makes up for what earlier halves made of earlier commands: no pulse is longer than the longest command makes it, and saturation shows
+/// the poles.
 #[test]
 fn saturation_shows_the_poles_though_pulses_are_of_unequal_length() {
     let tables = tables(true);
@@ -100,7 +101,7 @@ fn saturation_shows_the_poles_though_pulses_are_of_unequal_length() {
     }
 }
 
-/// Iron that the map knows to saturate along −d takes the poles' place: they are not believed, and a rotor that does not move has failed.
+/// Saturation along −d that the map already has masks the poles: they are not believed, and the start fails if the rotor does not move.
 #[test]
 fn poles_are_not_believed_where_the_map_saturates_the_other_way() {
     let tables = tables(true);
@@ -122,7 +123,7 @@ fn poles_are_not_believed_where_the_map_saturates_the_other_way() {
     }
 }
 
-/// Iron that saturates alike on both sides shows none: the rotor has to be pushed, and one that does not move has failed.
+/// Iron that saturates alike on both sides shows no poles: the rotor has to be pushed, and the start fails if it does not move.
 #[test]
 fn iron_without_poles_shows_none_and_a_rotor_that_is_held_has_failed() {
     let tables = tables(true);
@@ -146,7 +147,7 @@ fn a_machine_of_reluctance_alone_is_found_but_for_half_a_turn() {
     }
 }
 
-/// Pulses of unequal lengths alone look like an axis, along the longer ones.
+/// Pulses of unequal lengths by themselves look like an axis, along the longer ones.
 #[test]
 fn a_machine_without_saliency_has_no_axis() {
     let tables = tables(true);
@@ -156,7 +157,7 @@ fn a_machine_without_saliency_has_no_axis() {
     }
 }
 
-/// Half a turn is no error of a machine without magnets, and all of one of a machine with them.
+/// Half a turn is no error for a machine without magnets, and is wholly an error for a machine with them.
 #[test]
 fn half_a_turn_is_an_error_of_magnets_alone() {
     let [with, without] = [true, false].map(|magnets| tables(magnets).ratings);

@@ -44,7 +44,7 @@ fn keeps_its_bounds(line: &str) -> (Recording, Figures) {
 #[test]
 fn load_steps_are_quick_and_exact() {
     keeps_its_bounds("load-steps");
-    // How long full torque in one step takes depends on where in the carrier it comes.
+    // The time that full torque in one step takes depends on where in the carrier the step comes.
     for delay_us in (0..550).step_by(50).chain([25, 75, 290, 310, 545]) {
         keeps_its_bounds(&format!("full-step --pwm-delay-us {delay_us}"));
     }
@@ -53,7 +53,7 @@ fn load_steps_are_quick_and_exact() {
 #[test]
 fn torque_is_exact_at_the_characteristic_points() {
     keeps_its_bounds("characteristic");
-    // On a low link two to four of them are not to be had.
+    // On a low link, two to four of them are out of reach.
     for (udc_v, limited) in [(1000, 4), (1200, 2), (1800, 0)] {
         let line = format!("characteristic --udc {udc_v}");
         let (_, figures) = keeps_its_bounds(&line);
@@ -75,8 +75,8 @@ fn switches_of_mode_are_without_shock() {
     }
 }
 
-/// Torque at every edge of the pulses, where the rows of a trace need not be: of the sweeps with 10 to 100 % of torque on 1,000, 1,500 and 1,800 V those that changed
-/// modes with most, 58 N·m and 13.5 %, and one that changes with most now, 23 N·m.
+/// Torque at every edge of the pulses, which the rows of a trace may miss. Of the sweeps with 10 to 100 % of torque on 1,000, 1,500 and 1,800 V:
+/// those with the largest excursions at mode changes, 58 N·m and 13.5 %, and one with the largest now, 23 N·m.
 #[test]
 fn at_part_load_on_any_link_too() {
     for load in [
@@ -100,7 +100,7 @@ fn at_part_load_on_any_link_too() {
 #[test]
 fn square_wave_gives_its_power_to_the_highest_speed() {
     for (line, power_w) in [("sweep --to 6000", 246.4e3), ("sweep --to 6000 --brake", -246.4e3)] {
-        // By the power itself, too, not only by what the drive makes of the demand.
+        // Judged by the power itself, too, not only by what the drive makes of the demand.
         let (recording, _) = keeps_its_bounds(line);
         let tenths =
             (0..250).map(|k| analysis::window(&recording, 0.1 * f64::from(k), 0.1 * f64::from(k + 1)));
@@ -140,7 +140,7 @@ fn distortion_is_what_pulses_and_inductances_allow() {
         "1800 --torque 1235",
         "2000 --torque 859.4",
         "2000 --torque 600",
-        // Without torque there is hardly a fundamental: distortion, which is a share of it, is told, not judged.
+        // Without torque there is hardly any fundamental: distortion, a share of it, is reported, not judged.
         "3000 --torque 0",
         "2000 --torque 1174.6",
         "4000 --torque 588",
@@ -163,9 +163,9 @@ fn dead_time_leaves_no_harmonics() {
         let (with_it, alone) = (share(&with, "harmonics", order), share(&without, "harmonics", order));
         println!("{order}: {with_it} %, uncompensated {alone} %");
         assert!(with_it < 0.5);
-        // An inverter's dead time of 5 µs at 200 r/min is worth more than that: else nothing was left out.
+        // An inverter's dead time of 5 µs must cost more than that at 200 r/min; otherwise nothing was left out.
         assert!(alone > 0.5, "{alone} %");
-        // The report tells both of one run.
+        // The report gives both for one run.
         assert_eq!(share(&with, "harmonics_without_compensation", order), alone);
         let row = |what: &str| {
             let verdicts = list(&with, "verdicts");
@@ -178,8 +178,8 @@ fn dead_time_leaves_no_harmonics() {
     }
 }
 
-/// The sixth harmonic of the dead time is followed: where the zero crossings of the current are slow its sign is not enough. Without it
-/// 3.4 and 4.1 % were left.
+/// The sixth harmonic of the dead time is tracked: where the current crosses zero slowly, its sign is not enough. Without tracking, 3.4
+/// and 4.1 % were left.
 #[test]
 fn what_the_currents_sign_does_not_tell_of_the_dead_time_is_followed() {
     let figures = run("steady --speed 100 --torque 100 --dead-time-us 5");
@@ -259,8 +259,8 @@ fn the_choice_of_mode_does_not_follow_the_links_ripple() {
     }
 }
 
-/// A link that moves by 63 V in a millisecond, and one that turns over before a command acts: torque beyond the ripple band, which has the
-/// link's own swing of torque in it. By commands that were made for the link as it was sampled it was up to 118 N·m.
+/// A link that moves by 63 V in a millisecond, and one that reverses before a command acts: torque beyond the ripple band, which includes
+/// the torque swing of the link itself. With commands computed for the link as it was sampled, it was up to 118 N·m.
 #[test]
 fn a_link_that_moves_leaves_the_switches_without_shock() {
     let scenarios = [
@@ -314,7 +314,7 @@ fn the_link_may_be_anywhere_and_may_step() {
     }
 }
 
-/// In square wave on a high link the two signs of torque lie apart on the circle of flux: no way leads past the magnets' flux.
+/// In square wave on a high link, the two signs of torque lie apart on the flux circle: no path leads past the magnets' flux.
 #[test]
 fn torque_turns_over_where_the_voltage_forces_more_flux_than_the_magnets() {
     for speed in [4600, 5000] {
@@ -360,7 +360,7 @@ fn our_two_passes_beat_the_papers() {
     assert!(worst(&torque) < 0.3 && worst(&current) < 0.05);
 }
 
-/// The drive says all the time that the link does not give the torque, and what it gives is what it says.
+/// The drive reports all the time that the link does not allow the torque, and it gives the torque that it reports.
 #[test]
 fn a_torque_that_is_not_to_be_had_is_reported() {
     for (line, most_nm) in [

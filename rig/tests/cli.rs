@@ -89,7 +89,7 @@ fn bad_usage_is_refused() {
     refused("pattern --mode mid9 --u 1 --udc 2 --f1 3 --out x", &["mid9"]);
 }
 
-/// A file that stands where the files are to go is told before anything has run.
+/// A file in the place where the files are to go is reported before anything has run.
 #[test]
 fn a_place_that_is_taken_is_refused_before_anything_runs() {
     let folder = tempfile::tempdir().unwrap();
@@ -123,7 +123,7 @@ fn a_place_that_is_taken_is_refused_before_anything_runs() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// A run of the second system has no overview: that of a run before it does not stay.
+/// A run of the second system has no overview: that of an earlier run does not stay.
 #[test]
 fn no_picture_of_another_run_stays() {
     let folder = tempfile::tempdir().unwrap();
@@ -260,7 +260,7 @@ fn the_zs9_refuses_flaws_out_of_range_too() {
     refused_in_one_line("run zs9-load-step --udc-ripple 500@300", &["--udc-ripple 500", "400"]);
 }
 
-/// A window shorter than a turn of the field is taken as it is; it was lengthened into the time before.
+/// A window shorter than a turn of the field is taken as it is; it used to be lengthened into the time before.
 #[test]
 fn a_machine_that_stands_has_its_torque() {
     let folder = tempfile::tempdir().unwrap();

@@ -50,7 +50,7 @@ fn from_the_wiring_to_the_first_torque() {
     assert!(place.path().join("found/flux_map.csv").is_file());
 }
 
-/// A direct drive without its load, which a twentieth of its largest torque would take beyond its largest speed: it ended in `overspeed`.
+/// A direct drive without its load, which a twentieth of its largest torque would take beyond its largest speed: it used to end in `overspeed`.
 #[test]
 fn the_first_torque_takes_a_direct_drive_to_half_of_its_largest_speed() {
     let machine = nameplate::made(
@@ -63,8 +63,8 @@ fn the_first_torque_takes_a_direct_drive_to_half_of_its_largest_speed() {
     assert!((speed_rpm - 75.0).abs() < 4.0, "{speed_rpm}");
 }
 
-/// A zero that is some degrees off: the tables are of the zero that is right, the key to change and the number to add are told, and with it
-/// the first torque is.
+/// A zero that is some degrees off: the tables are made for the right zero, the key to change and the number to add are told, and the first
+/// torque uses the right zero.
 #[test]
 fn a_zero_that_is_off_is_told_and_the_tables_are_made() {
     for error_deg in [8.0, -10.0] {
@@ -83,7 +83,7 @@ fn a_zero_that_is_off_is_told_and_the_tables_are_made() {
     }
 }
 
-/// The rotor turns away under currents that are not along d by far: the experiment ends before it has gone far.
+/// The rotor turns away under currents that are far from the d axis: the experiment ends before it has gone far.
 #[test]
 fn an_angle_whose_zero_is_far_off_is_told_and_nothing_turns_with_it() {
     for words in ["--angle-error 60", "--angle-error -60"] {

@@ -53,7 +53,7 @@ fn whatever_conducts_drops_voltage_in_the_currents_direction() {
         let found_v = drops.drop_v(leg, current_a, current_a.signum());
         assert!((found_v - wanted_v).abs() < 1e-12, "{leg:?} {current_a} A: {found_v} V");
     }
-    // All three currents through one device each: what the drops take is heat.
+    // Each of the three currents flows through one device: the power lost in the drops is heat.
     let machine = catalogue::of_traction("sweep").unwrap().machine().unwrap();
     let settings = PlantSettings { drops, ..PlantSettings::default() };
     let mut plant = Plant::new(&machine.folder, SpeedSource::profile(vec![(0.0, 0.0)]), &settings);
@@ -64,7 +64,7 @@ fn whatever_conducts_drops_voltage_in_the_currents_direction() {
     assert!((taken_w / wanted_w - 1.0).abs() < 0.01, "{taken_w} W, {wanted_w} W");
 }
 
-/// Torque that is missing at a current, in N·m, where the iron has half of the loss that machine.toml names.
+/// Missing torque at a current, in N·m, if the iron has half of the loss that machine.toml names.
 fn missing_nm(speed_rpm: f64, (id_a, iq_a): (f64, f64)) -> f64 {
     let machine = catalogue::of_traction("sweep").unwrap().machine().unwrap();
     let [with, without] = [0.5, 0.0].map(|iron_share| {
@@ -77,7 +77,7 @@ fn missing_nm(speed_rpm: f64, (id_a, iq_a): (f64, f64)) -> f64 {
         (plant.motor.torque_nm(), worked)
     });
     if speed_rpm != 0.0 {
-        // What the rotor gets is the torque that is left.
+        // The rotor gets the torque that is left.
         assert!(((without.1 - with.1).abs() / (without.0 - with.0).abs() - 1.0).abs() < 0.02);
     }
     without.0 - with.0
@@ -85,7 +85,7 @@ fn missing_nm(speed_rpm: f64, (id_a, iq_a): (f64, f64)) -> f64 {
 
 #[test]
 fn iron_takes_its_loss_as_torque() {
-    // At the rated point half of 5,409 W, of which 0.6 are eddy currents'.
+    // At the rated point half of 5,409 W, of which eddy currents make 0.6.
     let rated = (-121.0, 112.7);
     let torque_nm = 0.5 * 5_409.0 / (2_000.0 * 0.104_72);
     let found = missing_nm(2_000.0, rated);
@@ -97,7 +97,7 @@ fn iron_takes_its_loss_as_torque() {
     assert!(none == 0.0 && weak > 0.0 && weak < 0.5 * found, "{none} N·m, {weak} N·m");
 }
 
-/// Unknown, half of the loss is 10 N·m of 784 that the rotor does not get.
+/// Half of the loss, if unknown, takes 10 N·m of 784 from the rotor.
 #[test]
 fn iron_loss_that_is_known_is_made_up_for() {
     let short_nm = |flaw: &str| {
@@ -172,7 +172,7 @@ fn all_at_once_leaves_what_was_given() {
     assert_eq!((flaws.iron_loss, flaws.adc_skew_us), (50.0, Some(Times([2.0, 1.0, 0.0]))));
     assert!(flaws.shaft.is_some());
     assert_eq!((options.own.angle_1f_deg, options.own.angle_2f_deg, options.own.udc_gain), (1.0, 0.5, 1.0));
-    // Devices that switch faster have shorter times, on a lower link lower voltages.
+    // Devices that switch faster have shorter times; on a lower link the voltages are lower.
     let chosen = catalogue::of_traction("load-steps --real --machine pmsm-48v-1kw").unwrap();
     let small = chosen.filled(&chosen.machine().unwrap());
     assert!(small.dead_time_us < 0.5 && small.own.flaws.device_drop.unwrap().0[0] < 0.1, "{small:?}");
@@ -187,7 +187,8 @@ fn without_the_word_for_all_there_is_none() {
     assert_eq!((options.own.flaws.offsets(), options.own.flaws.gains()), ([0.0; 3], [0.0; 3]));
 }
 
-/// Every scenario with all flaws: no fault, and the mean torque at the characteristic points within 2 %: where the voltage ends it nothing is left to make up for the iron with.
+/// Every scenario with all flaws: no fault, and the mean torque at the characteristic points within 2 %: at the voltage limit nothing is left to make
+/// up for the iron loss.
 #[test]
 fn no_scenario_trips_with_all_flaws() {
     for line in [
@@ -237,7 +238,7 @@ fn the_guide_has_what_each_idealisation_is_worth() {
     }
 }
 
-/// By how much current THD and torque ripple are over their bounds, in percent: of the steady point that the line names.
+/// Excess of current THD and torque ripple over their bounds, in percent, at the steady point that the line names.
 fn excess(line: &str) -> [f64; 2] {
     let chosen = catalogue::of_traction(&format!("steady {line}")).unwrap();
     let machine = chosen.machine().unwrap();
@@ -250,7 +251,7 @@ fn excess(line: &str) -> [f64; 2] {
     found
 }
 
-/// Without what is learnt 1° costs 110 % of THD at 3,000 r/min, 3° 537 %.
+/// Without learning, 1° costs 110 % of THD at 3,000 r/min, and 3° costs 537 %.
 #[test]
 fn a_resolvers_errors_are_learnt_and_taken_out() {
     for point in ["--speed 3000 --torque 784", "--speed -3000 --torque -784", "--speed 1500 --torque 1235"] {
@@ -286,7 +287,7 @@ fn settling_ms(flaw: &str) -> Vec<f64> {
     times
 }
 
-/// Without what is learnt at rest an offset of 2 % costs 116 % of THD and 69 % of torque ripple, and no step settles.
+/// Without learning at rest, an offset of 2 % costs 116 % of THD and 69 % of torque ripple, and no step settles.
 #[test]
 fn offsets_of_current_sensors_are_learnt_at_rest() {
     for point in ["--speed 200 --torque 1235", "--speed 1500 --torque 1235", "--speed 3000 --torque 784"] {
@@ -301,7 +302,7 @@ fn offsets_of_current_sensors_are_learnt_at_rest() {
     }
 }
 
-/// Without what is learnt of them gains of 2 % and −2 % cost 27 % of torque ripple at 200 r/min, and no step settles.
+/// Without learning them, gains of 2 % and −2 % cost 27 % of torque ripple at 200 r/min, and no step settles.
 #[test]
 fn differences_between_the_gains_of_current_sensors_are_learnt() {
     for point in ["--speed 200 --torque 1235", "--speed 1500 --torque 1235", "--speed 3000 --torque 784"] {
@@ -316,8 +317,9 @@ fn differences_between_the_gains_of_current_sensors_are_learnt() {
     }
 }
 
-/// Without what is learnt of it a link that is read 3 % too small costs 12.5 ms at a step; in a sweep 3.2 % of current and 53 N·m at a switch, and a switch back.
-/// The first step of `load-steps` is 0.2 s after the first pulses, when link and magnets cannot be told apart yet: taken for magnets, it took 9.2 ms.
+/// Without learning it, a link that is read 3 % too small costs 12.5 ms at a step, and in a sweep 3.2 % of current, 53 N·m at a switch, and a switch
+/// back. The first step of `load-steps` is 0.2 s after the first pulses, when errors of link and magnets cannot be told apart yet: with the error
+/// taken for the magnets', it took 9.2 ms.
 #[test]
 fn a_link_sensors_gain_is_learnt() {
     for gain in [-3, 3] {
@@ -333,14 +335,14 @@ fn a_link_sensors_gain_is_learnt() {
     }
 }
 
-/// Unknown, drops of devices cost 14.2 ms at the first step, out of no current, until the sixth harmonic is learnt.
+/// Drops of devices, if unknown, cost 14.2 ms at the first step, from zero current, until the sixth harmonic is learnt.
 #[test]
 fn drops_of_devices_that_are_known_are_made_up_for() {
     let times = settling_ms("--device-drop 2,5,1.5,3 --device-drop-known");
     assert!(times.iter().all(|ms| *ms < 5.0), "{times:?}");
 }
 
-/// By how much torque is off after each catch of `restart`, in percent, up to this speed in r/min.
+/// Torque error after each catch of `restart`, in percent, up to this speed in r/min.
 fn torque_off(flaw: &str, until_rpm: f64) -> f64 {
     let chosen = catalogue::of_traction(&format!("restart {flaw}")).unwrap();
     let machine = chosen.machine().unwrap();
@@ -356,13 +358,13 @@ fn torque_off(flaw: &str, until_rpm: f64) -> f64 {
     worst
 }
 
-/// Unknown, a filter of 100 µs costs 7 % of torque after a flying start at 2,000 r/min, and 78 % in square wave at 6,000.
+/// A filter of 100 µs, if unknown, costs 7 % of torque after a flying start at 2,000 r/min, and 78 % in square wave at 6,000.
 #[test]
 fn a_filter_of_the_current_sensors_that_is_known_is_made_up_for() {
     assert!(torque_off("--current-filter-us 100 --current-filter-known", f64::INFINITY) < 1.0);
 }
 
-/// Unknown, 7.3 and 1.6 % of torque at 6,000 r/min.
+/// Late angles and currents, if unknown, cost 7.3 and 1.6 % of torque at 6,000 r/min.
 #[test]
 fn instants_of_the_angle_and_of_the_currents_are_known_on_average() {
     assert!(torque_off("--angle-jitter-us 8 --angle-late-known", f64::INFINITY) < 1.0);
@@ -387,7 +389,7 @@ fn figures(line: &str) -> serde_json::Value {
     serde_json::to_value(chosen.figures(&recording, &machine).values()).unwrap()
 }
 
-/// Without the observer and its estimate 6 to 71 % are missing with hot magnets, and 3 to 30 % too much is made with cold ones.
+/// Without the observer and its estimate, 6 to 71 % of torque is missing with hot magnets, and cold ones give 3 to 30 % too much.
 #[test]
 fn torque_is_corrected_for_hot_and_for_cold_magnets() {
     for percent in [-18, 11] {
@@ -406,7 +408,8 @@ fn torque_is_corrected_for_hot_and_for_cold_magnets() {
     }
 }
 
-/// Magnets are known with a slow rotor as well, though the dead time hides them until a current flows: 16 % were missing while that was taken for another flux linkage.
+/// Magnets are identified with a slow rotor as well, though the dead time hides them until a current flows: 16 % were missing while that was taken
+/// for another flux linkage.
 #[test]
 fn hot_magnets_are_known_behind_a_dead_time() {
     for (percent, most) in [(-18, 2.5), (11, 1.5)] {
@@ -439,7 +442,7 @@ fn torque_is_told_whatever_is_off() {
     }
 }
 
-/// A map that is off by up to 15 %: torque within 3 % from the second catch on, after 0.2 s. At standstill, the first catch, nothing is to be seen of the flux linkage.
+/// A map that is off by up to 15 %: torque within 3 % from the second catch on, after 0.2 s. At standstill, the first catch, the flux linkage cannot be seen.
 #[test]
 fn torque_is_corrected_for_a_wrong_map() {
     for percent in [-15, -10, -5, 5, 10, 15] {

@@ -52,7 +52,7 @@ fn peaks_a(machine: &Machine, case: &Case) -> Option<[(f64, f64); STARTS]> {
     (!tripped).then_some(peaks)
 }
 
-/// Once it knows how wrong the map is the drive keeps to the machine's largest current, and before that it does not trip, on any link.
+/// Once the drive knows the error of the map, it keeps to the machine's largest current, and before that it does not trip, on any link.
 #[test]
 fn a_machine_with_other_flux_than_the_map_is_caught_within_its_current() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
@@ -74,8 +74,9 @@ fn a_machine_with_other_flux_than_the_map_is_caught_within_its_current() {
     assert_eq!(over, 0, "of {} cases", cases.len());
 }
 
-/// Machines whose magnets drive current through the diodes into the link, with magnets on the surface and buried, are caught with no more current than
-/// the machine's or the diodes' own, at twelve angles each. Led by a carrier the first tripped, as did the third by one that was cut off. Faster yet the second one's diodes trip it as it coasts.
+/// Machines whose magnets drive current through the diodes into the link, with magnets on the surface and buried, are caught with no more current
+/// than the machine's or the diodes' own, at twelve angles each. The first tripped when a carrier led it, as did the third with a carrier that was
+/// cut off. At a still higher speed, the second one's diodes trip it as it coasts.
 #[test]
 fn a_machine_whose_diodes_conduct_is_caught_as_it_coasts() {
     for (values, speeds_rpm) in [

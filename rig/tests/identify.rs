@@ -1,4 +1,4 @@
-//! Machines identified by their own drive, and how far what comes out is from the truth.
+//! Machines identified by their own drive, and the error of the result against the truth.
 
 mod linear;
 mod nameplate;
@@ -44,8 +44,8 @@ fn keeps_its_place(outcome: &Outcome) {
 
 const FLAWS: &str = "--noise-a 0.5 --dead-time-us 5 --uncompensated --rs-error 10 --inertia 3";
 
-/// Four seeds. By an earlier law of the pulses 50 and 83 left the corner of +d and much i_q so little known that the map fell there, and 15 missed the bound
-/// of flux linkage by its edges of unsure signs.
+/// Four seeds. With an earlier law of the pulses, seeds 50 and 83 left the corner of +d and large i_q so poorly known that the map decreased there,
+/// and seed 15 missed the bound of flux linkage by its edges of uncertain sign.
 #[test]
 fn the_reference_machine_with_noise_dead_time_and_a_wrong_resistance() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
@@ -81,7 +81,7 @@ fn device_drop(link_v: f64, current_a: f64) -> String {
     format!(" --device-drop {:.6},{:.6},{:.6},{:.6}", 2.0 * volts, 5.0 * ohms, 1.5 * volts, 3.0 * ohms)
 }
 
-/// Devices' thresholds beside the dead time: the bounds hold, and each is told, by the mean of eight seeds; the slope is resistance.
+/// Devices' thresholds beside the dead time: the bounds hold, and the mean of eight seeds tells the two apart; the slope counts as resistance.
 #[test]
 fn the_devices_thresholds_are_told_from_the_dead_time() {
     let reference = "pmasynrm-180kw";
@@ -89,7 +89,7 @@ fn the_devices_thresholds_are_told_from_the_dead_time() {
     let others = EVERY.into_iter().skip(1).map(|(name, flaws)| (name, flaws, 1));
     let cases: Vec<_> = cases.into_iter().chain(others).collect();
     let off_v: Vec<_> = cases.par_iter().map(|case| (case.0, thresholds_off_v(*case))).collect();
-    // Where control sees whole carriers the pulses tell the sum alone.
+    // If control sees whole carriers, the pulses tell only the sum.
     let own: Vec<_> = off_v.iter().filter(|(name, _)| *name == reference).map(|(_, off_v)| off_v).collect();
     for case in 0..2 {
         let mean_v = own.iter().map(|off_v| off_v[case]).sum::<f64>() / own.len() as f64;
@@ -98,7 +98,7 @@ fn the_devices_thresholds_are_told_from_the_dead_time() {
     }
 }
 
-/// By how much the found threshold is above the true one, in V: of none, and of devices.
+/// Excess of the found threshold over the true one, in V: without devices' drops, and with them.
 fn thresholds_off_v((name, flaws, seed): (&str, &str, u32)) -> [f64; 2] {
     let machine = Machine::load(name).unwrap();
     let parameters = &machine.folder.parameters;
@@ -117,7 +117,7 @@ fn thresholds_off_v((name, flaws, seed): (&str, &str, u32)) -> [f64; 2] {
     assert!(found.torque_worst < 0.01, "{case}: {}", found.torque_worst);
     assert!(found.magnet_error.abs() < 0.005, "{case}: {}", found.magnet_error);
     assert!(found.resistance_error.abs() < 0.01, "{case}: {}", found.resistance_error);
-    // Half of the time an IGBT conducts, half of it a diode.
+    // An IGBT conducts half of the time, a diode the other half.
     let threshold_v = 1.75 * link_v / 1_500.0;
     let dead_time_s = flaws.split(' ').nth(3).unwrap().parse::<f64>().unwrap() * 1e-6;
     let lacking_v = 0.5 * link_v * dead_time_s / half_s;
@@ -128,8 +128,8 @@ fn thresholds_off_v((name, flaws, seed): (&str, &str, u32)) -> [f64; 2] {
     })
 }
 
-/// The turning rotor's own flux linkages, by its voltage without resistance and inverter, are those of the pulses' map; of a map that is 2 % off they
-/// are not.
+/// The turning rotor's own flux linkages, from its voltage less the drops of resistance and inverter, agree with the pulses' map; with a map that is
+/// 2 % off they do not.
 #[test]
 fn the_turn_checks_the_map_of_the_pulses() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
@@ -160,7 +160,7 @@ fn commanded_over_the_protocol_as_a_board_is() {
 #[test]
 fn a_wrong_gain_of_link_or_currents_is_the_torques_error_and_no_more() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
-    // A wrong volt is a wrong weber, and nothing in the observations tells it; a wrong ampere is not where no current flows.
+    // A voltage error is a flux linkage error that no observation reveals; a current error is none where no current flows.
     for (gain, webers) in [
         ("--udc-gain 1", 0.01),
         ("--udc-gain -1", -0.01),
@@ -174,7 +174,7 @@ fn a_wrong_gain_of_link_or_currents_is_the_torques_error_and_no_more() {
     }
 }
 
-/// All flaws of `--real`, a link that is read 1 % wrong and magnets that are 1 % weaker than the folder's among them.
+/// All flaws of `--real`, including a link that is read 1 % wrong and magnets that are 1 % weaker than the folder's.
 #[test]
 fn a_machine_behind_a_real_inverter_is_found() {
     for name in ["pmasynrm-180kw", "pmsm-48v-1kw", "ipm-zs9"] {
@@ -204,7 +204,7 @@ const EVERY: [(&str, &str); 3] = [
     ("ipm-zs9", "--noise-a 0.18 --dead-time-us 0.48 --uncompensated --rs-error 10"),
 ];
 
-/// The rotor is free, and the currents along what the angle says is d are not along d.
+/// The rotor is free, and the currents along the supposed d axis are not along d.
 #[test]
 fn a_zero_that_is_off_is_found_with_the_machine() {
     let cases: Vec<_> = EVERY
@@ -230,7 +230,7 @@ fn a_zero_that_is_off_is_found_with_the_machine() {
     });
 }
 
-/// Offsets that the drive's own zeros make up for before the first pulse: little is left, and the map is as good.
+/// Offsets that the drive removes by its own zeros before the first pulse: little is left, and the map is as good.
 #[test]
 fn offsets_of_the_current_sensors_cost_nothing() {
     for ((name, flaws), offset_a) in EVERY.into_iter().zip([3.0_f64, 0.4, 1.1]) {
@@ -265,7 +265,7 @@ fn friction_is_found_beside_the_inertia() {
     }
 }
 
-/// Sensors of the wrong sign or in another order: their wires are told, and nothing else is done. Where some have the wrong sign the phases' sum is
+/// Sensors of the wrong sign or in another order: their wires are named, and nothing else is done. If some have the wrong sign, the phases' sum is
 /// not zero, which is a fault.
 #[test]
 fn wires_of_the_current_sensors_are_told() {
@@ -287,7 +287,7 @@ fn wires_of_the_current_sensors_are_told() {
             "{name}"
         );
     });
-    // A board's bus tells ten times a second what goes on: a first part of 20 kHz is over before.
+    // A board's bus reports progress ten times a second: at 20 kHz, a first part is over before that.
     let machine = Machine::load("pmsm-48v-1kw").unwrap();
     let ended = identified(&parsed("--over-protocol --current-sensors=v,u,w"), &machine).unwrap().err();
     assert_eq!(ended.and_then(|ended| ended.wiring).unwrap().to_string(), "v,u,w");
@@ -367,7 +367,7 @@ fn warm(folder: &Path, place: &Path) -> PathBuf {
     warm
 }
 
-/// Worst torque of the found tables' operating points on the true machine, off what the true machine's own points give there.
+/// Worst torque of the found tables' operating points on the true machine, as an error against the true machine's own points.
 fn worst_point_nm(machine: &Machine, folder: &Path, found: &Path, place: &Path) -> f64 {
     let parameters = &machine.folder.parameters;
     let [input, own, of_found] = ["in.csv", "own.csv", "found.csv"].map(|name| place.join(name));
@@ -401,8 +401,8 @@ fn worst_point_nm(machine: &Machine, folder: &Path, found: &Path, place: &Path) 
     own.iter().zip(&of_found).map(|(own, found)| (own - found).abs()).fold(0.0, f64::max)
 }
 
-/// Worst torque of a sweep with the found tables on the true machine, off its demand, as means of a tenth of a second; no fault. The machine's
-/// resistance is the one that was identified, and the step is no simple part of a carrier, so that ripple has no mean.
+/// Worst torque error of a sweep with the found tables on the true machine, against the demand, as means of a tenth of a second; no fault. The
+/// machine's resistance is the one that was identified, and the step is no simple fraction of a carrier, so that the ripple has no mean.
 fn worst_swept_nm(machine: &Machine, plant: &Path, found: &Path) -> f64 {
     let step_s = (0.37 / machine.folder.parameters.max_switching_hz).min(50e-6);
     let flaws = format!("sweep --rs-error 10 --dt {step_s}");
@@ -509,7 +509,7 @@ fn new(values: &str, place: &Path, name: &str) -> PathBuf {
     folder
 }
 
-/// The experiment of a nameplate's machine with each of so many seeds: its recording, and the bound of current in A.
+/// Runs the experiment on a nameplate's machine with each of so many seeds; each is judged by its recording and the bound of current in A.
 fn driven(values: &str, seeds: u32, judge: impl Fn(u32, &Recording, f64) + Sync) {
     let place = tempfile::tempdir().unwrap();
     let machine = Machine::load(new(values, place.path(), "saturates").to_str().unwrap()).unwrap();
@@ -525,7 +525,7 @@ fn driven(values: &str, seeds: u32, judge: impl Fn(u32, &Recording, f64) + Sync)
     });
 }
 
-/// The reach of the pulses along q: in the band of a tenth of the bound along d where it is least, as a share of the circle that boundaries keep to.
+/// Reach of the pulses along q, as a share of the circle that boundaries keep to: the least of all bands along d, each a tenth of the bound wide.
 fn reach(recording: &Recording, bound_a: f64) -> f64 {
     let shares = recording.observations.iter().map(|o| (f64::from(o.current.d), f64::from(o.current.q)));
     let shares: Vec<_> = shares.map(|(d, q)| (d / bound_a, q.abs() / bound_a)).collect();
@@ -537,8 +537,8 @@ fn reach(recording: &Recording, bound_a: f64) -> f64 {
     (-9..=1).map(of_band).fold(1.0, f64::min)
 }
 
-/// Iron whose L_q keeps 0.4 of itself, of seven machines, most of which saturate along d too: the bound is kept by pulses along q that come near to it
-/// beside every current along d, and not by none; of laws that kept the bound by none they reached 0.02 of the circle.
+/// Iron whose L_q falls to 0.4 of itself, in seven machines, most of which saturate along d too: the pulses along q keep the bound and still come
+/// near it beside every current along d. With laws that kept the bound by making no pulses, they reached 0.02 of the circle.
 #[test]
 fn much_saturation_keeps_the_bound_of_current() {
     let tram = TRAM.replace(" --saturation 0.6", "");
@@ -581,8 +581,8 @@ fn much_saturation_keeps_the_bound_of_current() {
     }
 }
 
-/// Changes of a current that stands still are noise: the law learns nothing of them, and the turning rotor's current stays where it is wanted, at 0.32
-/// of the bound. Iron whose L_q keeps 0.35 of itself: what noise had taught let it go to 1.87 of the bound, which is a fault.
+/// Changes of a constant current are noise: the law learns nothing from them, and the turning rotor's current stays at its reference, 0.32 of the
+/// bound. With iron whose L_q falls to 0.35 of itself, a law that had learnt from noise let the current rise to 1.87 of the bound, which is a fault.
 #[test]
 fn the_turning_rotors_current_stays_where_it_is_wanted() {
     const VALUES: &str = "--pole-pairs 5 --rs 0.9 --ld 6e-3 --lq 11e-3 --psi-f 0.18 --saturation 0.35 --max-current 20 --udc 560 \
@@ -597,7 +597,8 @@ fn the_turning_rotors_current_stays_where_it_is_wanted() {
     });
 }
 
-/// Iron goes on to saturate where no pulse has been, and so does the map: at the peaks of ripple, as good as the flux linkage's mean error is to be within the bound.
+/// Iron goes on saturating beyond the pulses, and so does the map: at the peaks of ripple it is as good as the flux linkage's mean error has to be
+/// within the bound.
 #[test]
 fn the_map_goes_on_with_its_bend_where_ripple_is() {
     let place = tempfile::tempdir().unwrap();
@@ -644,7 +645,7 @@ fn a_demagnetisation_limit_is_kept_and_handed_on() {
     });
 }
 
-/// A limit that leaves the pulses nothing against the magnets' flux is refused by its key.
+/// A limit that leaves the pulses no current against the magnets' flux is refused, and its key is named.
 #[test]
 fn a_limit_without_pulses_along_d_is_refused() {
     let place = tempfile::tempdir().unwrap();
@@ -731,7 +732,7 @@ fn a_fault_ends_the_experiment_with_gates_off_and_nothing_half_written() {
     }
 }
 
-/// A folder that stands there already stays as it was.
+/// A folder that already exists stays as it was.
 #[test]
 fn a_fault_leaves_the_folder_that_was_there() {
     let place = tempfile::tempdir().unwrap();
@@ -745,7 +746,7 @@ fn a_fault_leaves_the_folder_that_was_there() {
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1);
 }
 
-/// Nothing compensates the dead time whatever is said, and what the experiment is not made for is refused by name.
+/// The dead time is never compensated, whatever the options say, and anything the experiment is not made for is refused by name.
 #[test]
 fn nothing_wrong_can_be_run() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();

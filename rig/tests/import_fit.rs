@@ -98,8 +98,8 @@ fn rough_maps_are_the_machine_that_they_are_of_and_their_fit_is_told() {
     }
 }
 
-/// Ribs that saturate at a fifteenth of the largest current are a knee that no polynomial follows: the one that foretells left-out nodes best waves, so
-/// that flux linkage falls somewhere, and a smoother one is taken.
+/// Ribs that saturate at a fifteenth of the largest current are a knee that no polynomial follows: the one that best predicts left-out nodes
+/// oscillates, so that flux linkage falls somewhere, and a smoother one is taken.
 #[test]
 fn a_sharp_knee_is_a_smooth_machine() {
     let flux = |id: f64, iq: f64| {

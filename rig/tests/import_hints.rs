@@ -86,7 +86,7 @@ fn the_reading_that_makes_a_map_a_machines_is_named_and_does() {
     }
 }
 
-/// Start-up looks for d where inductance is least: an L_d that is larger by less than it tells apart, 6 %, is none of its concern.
+/// Start-up looks for d where inductance is least: an L_d that is larger by less than start-up can tell apart, 6 %, does not matter to it.
 #[test]
 fn an_inductance_that_is_hardly_larger_along_the_magnets_is_taken() {
     let folder = tempfile::tempdir().unwrap();
@@ -137,7 +137,7 @@ fn a_likely_mistake_of_units_is_named() {
     }
 }
 
-/// A map's own torque tells what its numbers do not: rms from peak, and other pole pairs.
+/// A map's own torque reveals what its numbers do not: rms from peak, and other pole pairs.
 #[test]
 fn a_torque_beside_the_flux_linkages_is_held_against_them() {
     let folder = tempfile::tempdir().unwrap();

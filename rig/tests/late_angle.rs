@@ -40,7 +40,7 @@ fn an_encoder_tells_the_middle_of_its_counts() {
     assert!(worst < 0.01, "{worst}");
 }
 
-/// 1,024 counts a turn of the shaft are 1.4°, electrical, each: the speed tracker's angle is nearer. With the sensor's own 4.7 % were left.
+/// 1,024 counts a turn of the shaft are 1.4°, electrical, each: the speed tracker's angle is closer. With the sensor's own angle, 4.7 % were left.
 #[test]
 fn between_coarse_counts_the_angle_follows_the_speed() {
     for lines in [256, 512] {

@@ -43,7 +43,7 @@ fn a_servo_motor_by_itself_is_followed_at_full_torque() {
     assert!(trip.is_none() && fastest_rpm > 0.5 * parameters.max_speed_rpm, "{trip:?} {fastest_rpm}");
 }
 
-/// One that control cannot follow at its usual rate is refused by what is wrong with it, and runs at the rate that is named.
+/// A rotor that control cannot follow at its usual rate is refused with the reason, and runs at the rate that is named.
 #[test]
 fn a_rotor_that_is_too_light_is_refused_by_name() {
     let folder = made(&format!("{SERVO} --inertia 0.0003"));

@@ -183,8 +183,8 @@ fn a_sweep_behind_a_line_filter_keeps_its_bounds() {
     }
 }
 
-/// A drive whose demand is beyond what the link gives damps it as well: there the torque follows the voltage limit, and that the link's swing. Where the limit
-/// followed the link by its slow value alone these swung by 6.5 and 3.1 %.
+/// A drive whose demand is beyond what the link gives damps it as well: the torque then follows the voltage limit, and the limit follows the link's
+/// swing. When the limit followed only the link's slow value, these swung by 6.5 and 3.1 %.
 #[test]
 fn a_demand_beyond_what_the_link_gives_is_damped() {
     for command in [
@@ -201,7 +201,8 @@ fn a_demand_beyond_what_the_link_gives_is_damped() {
     }
 }
 
-/// The start of square wave at full torque, behind a large filter: with a voltage limit that follows the link there, too, torque swung by 13 % more than the ripple has.
+/// The start of square wave at full torque, behind a large filter: when the voltage limit followed the link there, too, torque swung by 13 % more
+/// than the ripple has.
 #[test]
 fn square_wave_begins_within_its_ripple() {
     let chosen = catalogue::of_traction("steady --speed 1905 --torque 1235 --line 8,4,10").unwrap();

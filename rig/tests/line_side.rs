@@ -60,7 +60,7 @@ fn a_line_that_is_lost_for_a_while_is_waited_for() {
     }
 }
 
-/// The line's current and power within 2 % of their limits, and used: on a line of nominal, sagged and highest voltage, of the other machine.
+/// The line's current and power stay within 2 % of their limits, and use them: on a line of nominal, sagged and highest voltage, and with the other machine.
 #[test]
 fn line_current_and_line_power_keep_their_limits() {
     for line in [
@@ -74,7 +74,8 @@ fn line_current_and_line_power_keep_their_limits() {
     }
 }
 
-/// A limit that falls with the rising speed is kept while jerk holds the demand's ramp back: the line's current was 0.7 % over it, and 3.4 % over one of 30 A.
+/// A limit that falls as the speed rises is kept while jerk holds the demand's ramp back: the line's current used to be 0.7 % over it, and 3.4 % over
+/// one of 30 A.
 #[test]
 fn the_line_s_limit_does_not_wait_for_jerk() {
     let chosen = catalogue::of_traction("line-limits").unwrap();
@@ -84,7 +85,7 @@ fn the_line_s_limit_does_not_wait_for_jerk() {
     assert!(over < 1.005, "{over}");
 }
 
-/// Copper loss of three pulses' ripple is much of the line's power where little torque is left: by the references' loss alone it was 1.019.
+/// Copper loss of three pulses' ripple is much of the line's power where little torque is left: with the references' loss alone, it was 1.019 of its limit.
 #[test]
 fn the_ripple_s_loss_is_part_of_the_line_s_power() {
     let chosen = catalogue::of_traction("line-limits --line-current 30 --line-power 40").unwrap();
@@ -107,7 +108,8 @@ fn a_wheel_that_loses_its_grip_is_caught() {
     assert!(rise.is_some_and(|rise| rise.parse::<f64>().unwrap() > 0.2), "{short:?}");
 }
 
-/// A light rotor's angle is followed so quickly that its sensor's errors are seen as changes of speed: they took away all torque of a wheel with grip.
+/// A light rotor's angle is followed so quickly that its sensor's errors are seen as changes of speed: they used to take away all torque of a wheel
+/// with grip.
 #[test]
 fn an_angle_that_is_off_is_no_slip() {
     let folder = nameplate::made(

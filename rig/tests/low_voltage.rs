@@ -1,5 +1,5 @@
-//! Every scenario of the two-level drive with a machine of 48 V and 20 kHz, by the rule of exit code 0: no fault, and no bound that
-//! falls short.
+//! Every scenario of the two-level drive with a machine of 48 V and 20 kHz, judged by the rule of exit code 0: no fault, and no
+//! bound that is missed.
 
 mod nameplate;
 
@@ -40,7 +40,7 @@ fn every_scenario_keeps_its_bounds_with_48_volts_and_20_kilohertz() {
     assert!(complaints.is_empty(), "{complaints:#?}");
 }
 
-/// Copper takes a quarter of the braking power of a hub motor: it is no fault of the drive that the link does not get it.
+/// Copper loss takes a quarter of a hub motor's braking power: that the link does not get it is no failure of the drive.
 #[test]
 fn a_hub_motor_brakes_into_its_link_as_far_as_its_copper_leaves_it() {
     keeps_its_bounds(
@@ -49,7 +49,7 @@ fn a_hub_motor_brakes_into_its_link_as_far_as_its_copper_leaves_it() {
     );
 }
 
-/// A gearless motor whose EMF at its largest speed is a fiftieth of what the link gives: it never weakens, and is a machine like another.
+/// A gearless motor whose EMF at its largest speed is a fiftieth of what the link gives: it never needs field weakening, and is a machine like any other.
 #[test]
 fn a_machine_that_never_weakens_keeps_its_bounds() {
     keeps_its_bounds(
@@ -58,8 +58,8 @@ fn a_machine_that_never_weakens_keeps_its_bounds() {
     );
 }
 
-/// A machine of reluctance alone has no flux linkage without a current, and tells nothing of its map there: what had been learnt of it made torque
-/// 18 % larger than wanted after a catch. Without torque it has no ripple, and none is no excess over none.
+/// A machine of reluctance alone has no flux linkage without a current, and reveals nothing about its map there: what had been learnt of it made
+/// torque 18 % larger than wanted after a catch. Without torque it has no ripple, and no ripple is not in excess of no ripple.
 #[test]
 fn a_machine_of_reluctance_alone_keeps_its_torque() {
     keeps_its_bounds(
@@ -68,8 +68,8 @@ fn a_machine_of_reluctance_alone_keeps_its_torque() {
     );
 }
 
-/// A machine of much reluctance whose line is lost just after a switch to three pulses: its torque goes within some milliseconds, and the pulses' ripple at so little
-/// voltage, while they waited for 30 ms to have passed, was beyond its trip level.
+/// A machine of much reluctance whose line is lost just after a switch to three pulses: its torque is gone within some milliseconds. When the pulses
+/// waited for 30 ms to pass, their ripple at so little voltage was beyond the trip level.
 #[test]
 fn a_pattern_that_has_just_begun_gives_way_where_torque_goes() {
     keeps_its_bounds(
@@ -78,8 +78,9 @@ fn a_pattern_that_has_just_begun_gives_way_where_torque_goes() {
     );
 }
 
-/// A machine that takes its largest current for its largest torque leaves square wave at it: where three pulses needed a little less than their voltage, the
-/// operating point stood for 3 ms where the circles of that voltage and of the current cross, and torque moved by 29 N·m and the current by 3.4 % more than it has.
+/// A machine that needs its largest current for its largest torque leaves square wave at that current. When three pulses needed a little less than
+/// their voltage, the operating point stood for 3 ms where the circles of that voltage and of the current cross: torque moved by 29 N·m, and the
+/// current by 3.4 % more than it has.
 #[test]
 fn a_machine_at_its_largest_current_leaves_square_wave_without_a_jump() {
     keeps_its_bounds(
@@ -88,8 +89,8 @@ fn a_machine_at_its_largest_current_leaves_square_wave_without_a_jump() {
     );
 }
 
-/// A machine that weakens where its free carrier ends: on the way down patterns have the carrier's voltage before it takes over. It did so from square wave with 93 of
-/// 739 N·m too little for 5 ms; with optimised patterns 34 N·m were too much.
+/// A machine that is in field weakening where its free carrier ends: on the way down, patterns have the carrier's voltage before it takes over. It
+/// used to take over from square wave, with 93 of 739 N·m missing for 5 ms; with optimised patterns, torque was 34 N·m too large.
 #[test]
 fn a_free_carrier_takes_over_where_patterns_have_its_voltage() {
     const VALUES: &str = "--pole-pairs 4 --rs 0.03 --ld 0.9e-3 --lq 1.9e-3 --psi-f 0.28 --saturation 0.8 --max-current 350 --udc 600 --max-speed-rpm 4500 --max-switching-hz 3000";
@@ -102,18 +103,19 @@ fn a_free_carrier_takes_over_where_patterns_have_its_voltage() {
     keeps_its_bounds(VALUES, &[("sweep --to 2300 --down --patterns optimal", 4)]);
 }
 
-/// A machine whose patterns have halves down to 0.36 of a control period goes through all five modes to 2 kHz of stator frequency: which half leads the flux to
-/// a pattern the modulator alone knows. Led by control it tripped where the first pattern began, and, counted as if its command were for the next half, in square wave.
+/// A machine whose patterns have halves as short as 0.36 of a control period goes through all five modes to 2 kHz of stator frequency: the modulator
+/// alone knows which half leads the flux to a pattern. When control led the flux, it tripped where the first pattern began; when its command counted
+/// for the next half, it tripped in square wave.
 #[test]
 fn patterns_faster_than_control_keep_their_current() {
     const VALUES: &str = "--pole-pairs 10 --rs 0.00274 --ld 19.6e-6 --lq 58.8e-6 --psi-f 0.00918 --saturation 0.7 --max-current 780 --udc 370 --max-speed-rpm 12000 --max-switching-hz 8000";
     keeps_its_bounds(VALUES, &[("sweep", 5), ("reversal", 2)]);
-    // Optimised patterns, whose edges were moved by twice the error.
+    // Optimised patterns: their edges were once moved by twice the error.
     swept(VALUES, "--patterns optimal");
 }
 
-/// Of a machine whose locked carriers have halves of half a control period a command acts for two of them. Taken for one, it took away twice its error, and the
-/// machine tripped at 5,332 r/min. Trimmed by so few samples of its torque it was 1.9 % off after a catch.
+/// A command acts for two halves if a machine's locked carriers have halves of half a control period. Computed for one, it removed twice its error,
+/// and the machine tripped at 5,332 r/min. Trimmed by so few samples of its torque, it was 1.9 % off after a catch.
 #[test]
 fn a_locked_carrier_as_fast_as_control_keeps_its_current() {
     keeps_its_bounds(
@@ -129,8 +131,8 @@ fn a_locked_carrier_as_fast_as_control_keeps_its_current() {
     );
 }
 
-/// Machines whose carrier half is no whole part of a control period: a command makes one half or two, and is made for as many. Made for a control period whichever it was, it
-/// took away up to 1.25 of its error, and steps of torque overshot by 21, 6.5, 19 and 19 %.
+/// Machines whose carrier half is no whole part of a control period: a command makes one half or two, and is computed for as many. Computed for a
+/// control period in either case, it removed up to 1.25 of its error, and steps of torque overshot by 21, 6.5, 19 and 19 %.
 #[test]
 fn a_command_is_made_for_the_halves_that_use_it() {
     [
@@ -143,9 +145,9 @@ fn a_command_is_made_for_the_halves_that_use_it() {
     .for_each(|values| keeps_its_bounds(values, &[("load-steps", 4), ("full-step", 4)]));
 }
 
-/// Machines that weaken below the end of their free carrier, a car's first: a locked carrier leads their flux linkage to where a pattern begins, and the pattern begins
-/// with the carrier's voltage. The car's machine tripped without the one, and without the other took 12 % of current more than either mode has;
-/// then the second and the third tripped.
+/// Machines whose field weakening begins below the end of their free carrier, a car's first: a locked carrier leads their flux linkage to where a
+/// pattern begins, and the pattern begins with the carrier's voltage. Without the former, the car's machine tripped; without the latter, it took 12 %
+/// more current than either mode has; then the second and the third tripped.
 #[test]
 fn a_weakened_machine_leaves_its_free_carrier_by_a_locked_one() {
     [
@@ -166,8 +168,9 @@ fn a_weakened_machine_leaves_its_free_carrier_by_a_locked_one() {
     });
 }
 
-/// Patterns of fast devices follow each other faster, and so does what they take of a flux error. At the same 350 rad/s whatever the devices, flux linkage that changes where a machine
-/// comes out of weakening stayed behind: the motor of 8 kHz took 6.3 % more current than either mode, that of 2 kHz was 35 N·m off where its square wave ends.
+/// Patterns of fast devices follow each other faster, and so they remove a flux error faster. With the same 350 rad/s for all devices, the flux
+/// linkage, which changes where a machine leaves field weakening, lagged behind: the motor of 8 kHz took 6.3 % more current than either mode, and
+/// that of 2 kHz was 35 N·m off where its square wave ends.
 #[test]
 fn a_pattern_follows_its_flux_as_fast_as_the_devices_are() {
     [
@@ -186,8 +189,8 @@ fn a_pattern_follows_its_flux_as_fast_as_the_devices_are() {
     });
 }
 
-/// Of a machine whose pulses make the current half as large again as its largest one, the trip is chosen above that. At 1.3 of the largest current, as without, it
-/// tripped where its free carrier ends.
+/// The trip level of a machine whose pulses make the current half as large again as its largest one is chosen above that. At 1.3 of the largest
+/// current, the level without such pulses, it tripped where its free carrier ends.
 #[test]
 fn the_trip_leaves_the_ripple_its_room() {
     const VALUES: &str = "--pole-pairs 10 --rs 0.0199 --ld 2.02e-3 --lq 8.36e-3 --psi-f 0 --saturation 0.4 --max-current 306 --udc 1500 --udc-min 1500 --udc-max 1500 --max-speed-rpm 1214 --max-switching-hz 900";
@@ -207,8 +210,8 @@ fn the_trip_leaves_the_ripple_its_room() {
     assert_eq!(Machine::load(usual.path().to_str().unwrap()).unwrap().folder.parameters.trip_current_a, 39.0);
 }
 
-/// The ripple of few pulses on a map that saturates to a half and less has a torque of its own, and a drop in the resistance that is none of the mean current's. Neither
-/// foreseen, torque was 1.3, 2.0, 3.8 and 19 % off.
+/// The ripple of few pulses on a map that saturates to a half and less makes a torque of its own, and a resistive drop that the mean current does not
+/// have. With neither foreseen, torque was 1.3, 2.0, 3.8 and 19 % off.
 #[test]
 fn a_large_ripple_on_a_saturated_map_keeps_the_mean_torque() {
     [
@@ -221,8 +224,8 @@ fn a_large_ripple_on_a_saturated_map_keeps_the_mean_torque() {
     .for_each(|(values, scenario)| keeps_its_bounds(values, &[(scenario, 2)]));
 }
 
-/// A machine of reluctance alone has its torque reversed and taken away in weakening with no more than its current: its flux linkage goes straight where the voltage has no room,
-/// and does not stay behind the rotor. It took 1.33 and 1.30 of its largest steady current.
+/// A machine of reluctance alone has its torque reversed and removed in field weakening with no more than its own current: where the voltage has no
+/// room, its flux linkage goes straight and does not lag behind the rotor. It used to take 1.33 and 1.30 of its largest steady current.
 #[test]
 fn a_machine_of_reluctance_alone_lets_go_of_its_torque_without_more_current() {
     [
@@ -233,7 +236,7 @@ fn a_machine_of_reluctance_alone_lets_go_of_its_torque_without_more_current() {
     .for_each(|values| keeps_its_bounds(values, &[("reversal", 2)]));
 }
 
-/// The sweep of a machine of a nameplate's values, which does not trip.
+/// Sweep of a machine made from a nameplate's values, which does not trip.
 fn swept(values: &str, options: &str) -> (Recording, Figures) {
     let folder = made(values);
     let line = format!("sweep {options} --machine {}", folder.path().display());
@@ -298,7 +301,7 @@ fn a_scenario_asks_what_the_machine_has() {
     assert!((speed_rpm / parameters.rated_speed_rpm - 0.1).abs() < 1e-6, "{speed_rpm} r/min");
 }
 
-/// A bound that another machine does not keep is exit code 1, as it is of the paper's; its page names no figure of the paper.
+/// A bound that another machine does not keep gives exit code 1, as for the paper's machine; its page names no figure of the paper.
 #[test]
 fn a_bound_that_is_not_kept_is_exit_code_1_for_every_machine() {
     let folder = tempfile::tempdir().unwrap();
@@ -318,7 +321,7 @@ fn a_bound_that_is_not_kept_is_exit_code_1_for_every_machine() {
     assert!(code == Some(1) && said.starts_with("FALLS SHORT: 1 of 2 bounds"), "{code:?}: {said}");
 }
 
-/// A heading names a figure of the paper where the plot shows the same: of that machine, and nothing that the paper does not show.
+/// A heading names a figure of the paper only if the plot shows the same: that machine, and nothing that the paper does not show.
 #[test]
 fn a_plot_names_the_papers_figure_only_where_it_shows_the_same() {
     let headings = |line: &str| {

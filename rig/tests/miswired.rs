@@ -14,7 +14,7 @@ fn fault_of(machine: &str, mistake: &str) -> Option<Fault> {
     recording.trip().map(|trip| trip.fault)
 }
 
-/// Of these 24 sweeps five went to the highest speed before the voltage was looked at, among them the 48 V machine's with a zero that is 120° off.
+/// Before the voltage was checked, five of these 24 sweeps went to the highest speed, among them the 48 V machine's with a zero that is 120° off.
 #[test]
 fn a_wrong_zero_a_wrong_direction_and_phases_that_are_exchanged_are_named() {
     const MISTAKES: [&str; 8] = [

@@ -75,8 +75,8 @@ fn at_part_load_too() {
     }
 }
 
-/// Whatever phase the free carrier happens to have: its last halves end where the pattern begins, and lead the flux linkage there. Of halves that ended by
-/// chance within 1.5° these four loads had 2.3 to 3.5 % of current, and up to 19 N·m.
+/// Whatever phase the free carrier happens to have, its last halves end where the pattern begins, and lead the flux linkage there. With halves that
+/// ended within 1.5° only by chance, these four loads had 2.3 to 3.5 % of current, and up to 19 N·m.
 #[test]
 fn a_free_carrier_gives_way_without_a_shock() {
     for load in ["0.15", "0.25", "0.4", "0.6"] {
@@ -90,7 +90,7 @@ fn a_free_carrier_gives_way_without_a_shock() {
     }
 }
 
-/// Two phases have edges soon after the switch, so that nothing wrong stays.
+/// Two phases have edges soon after the switch, so that no error stays.
 #[test]
 fn from_eleven_pulses_to_nine() {
     for load in ["--brake --torque-scale 0.15", "--torque-scale 0.33"] {

@@ -231,8 +231,8 @@ fn others() -> Vec<Case> {
     linear.chain([Case::analytic("small, saturating", &SMALL)]).collect()
 }
 
-/// The freedom that a folder's nodes leave: by how much the flux linkage between them differs from the machine's, as a share, at most,
-/// anywhere within the current limit where there is as much of it as the lowest link leaves.
+/// The freedom that a folder's nodes leave: the largest difference of the flux linkage between them from the machine's, as a share,
+/// anywhere within the current limit where the flux linkage is at least what the lowest link leaves.
 fn between_nodes(case: &Case) -> f64 {
     const STEPS: u32 = 200;
     let parameters = &case.machine.folder.parameters;

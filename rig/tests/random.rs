@@ -138,7 +138,7 @@ fn a_current_that_reaches_its_trip_level_before_the_leg_is_seen_is_caught() {
     is_caught(&run, "vh-stuck-off", "overcurrent");
 }
 
-/// The drive trips at more where a sensor reads too little: that is the sensor's, and no fault of the drive.
+/// The drive trips at more if a sensor reads too little: that is the sensor's error, and no failure of the drive.
 #[test]
 fn trip_levels_are_those_of_what_is_read() {
     let odd = [("capacitance_mf", 4.376), ("udc_gain", -0.009493)];
@@ -146,13 +146,13 @@ fn trip_levels_are_those_of_what_is_read() {
     is_caught(&run, "link-over", "dc_overvoltage");
 }
 
-/// Of ten thousand runs with the paper's patterns: current that the diodes keep alive after a fault that control finds, and where control is
-/// lost; a sensor's error that is found while it is small; a link of 1,714 V, on which current rises faster. Of three thousand with optimised ones: pulses
-/// that begin where the diodes rectify, after rest and after a pause in which torque changes its sign, and where the free carrier has three
-/// pulses a turn. Of ten thousand with these, square wave that takes over at 294 Hz without torque, on a high link, and torque that
-/// falls to none at a small modulation index, where one phase at a time has edges, and there is less flux linkage than by the map; and pulses that begin where three
-/// pulses are filled up to nearly the whole. Of ten thousand with
-/// the paper's and another seed, torque that is reversed when seven pulses are already announced. A sensor's error of which the converters' steps hide the last part.
+/// From ten thousand runs with the paper's patterns: current that the diodes keep alive after a fault that control finds, and after control is lost;
+/// a sensor's error that is found while it is small; a link of 1,714 V, on which current rises faster. From three thousand with optimised ones:
+/// pulses that begin where the diodes rectify, after rest and after a pause in which torque changes its sign, and where the free carrier has three
+/// pulses a turn. From ten thousand with these: square wave that takes over at 294 Hz without torque, on a high link; torque that falls to none at a
+/// small modulation index, where one phase at a time has edges and there is less flux linkage than by the map; and pulses that begin where three
+/// pulses are almost completely filled up. From ten thousand with the paper's and another seed: torque that is reversed when seven pulses are already
+/// announced. A sensor's error of which the converters' steps hide the last part.
 #[test]
 fn what_large_campaigns_found_stays_mended() {
     const FOUND: [(usize, u64, PatternsName, &[usize]); 5] = [

@@ -1,4 +1,4 @@
-//! Starts without an angle: wherever the rotor stands, the drive finds out before it turns it.
+//! Starts without an angle: wherever the rotor stands, the drive finds its angle before it turns it.
 
 mod nameplate;
 
@@ -54,8 +54,8 @@ fn a_machine_that_does_not_saturate_starts_from_any_angle() {
     assert!(starts(MACHINES[1], "--noise-a 0.5 --dead-time-us 5", 2) < 5.0);
 }
 
-/// Noise of as large a share of the current as half an ampere is of the traction machine's: half an ampere is a fault by itself, as the
-/// phases' sum. And the dead time of a stage of 20 kHz: 5 µs are a fifth of its carrier halves, and one start of some twenty then takes the wrong pole.
+/// Noise of the same share of the current as half an ampere on the traction machine: here half an ampere is a fault by itself, by the phases' sum.
+/// And the dead time of a stage of 20 kHz: 5 µs are a fifth of its carrier halves, and about one start in twenty then takes the wrong pole.
 #[test]
 fn a_small_machine_starts_from_any_angle() {
     assert!(starts(MACHINES[2], "", 1) < 5.0);
@@ -72,8 +72,8 @@ fn a_rotor_that_is_braked_shows_its_polarity_by_saturation_or_not_at_all() {
     assert!(recording.found.is_none());
 }
 
-/// Machines of a nameplate: carriers of one or two halves for a command, which makes pulses of unequal lengths; the first three then took the wrong pole, or an axis
-/// that was up to 15° off. One whose map ends along +d where its pulses begin to saturate it; and two of reluctance alone, which have no poles.
+/// Machines from nameplates: carriers of one or two halves for a command, which make pulses of unequal lengths; the first three then took the wrong pole,
+/// or an axis that was up to 15° off. One whose map ends along +d where its pulses begin to saturate it; and two of reluctance alone, which have no poles.
 const NAMEPLATES: [&str; 8] = [
     "--pole-pairs 5 --rs 0.0226 --max-current 120 --udc 750 --max-speed-rpm 7402 --max-switching-hz 16000 --ld 0.000316 --lq 0.00156 --psi-f 0.0491 --saturation 0.5",
     "--pole-pairs 10 --rs 0.0126 --max-current 65.1 --udc 24 --max-speed-rpm 4597 --max-switching-hz 8000 --ld 0.0000296 --lq 0.000081 --psi-f 0.0018 --saturation 0.6",
@@ -109,7 +109,7 @@ fn a_light_rotor_starts_however_it_is_held() {
     }
 }
 
-/// Starts from several angles, that keep their bounds and find the angle to so many degrees.
+/// Starts from several angles, which must keep their bounds and find the angle to so many degrees.
 fn starts_of(values: &str, folder: &TempDir, flaws: &str, most_deg: f64) {
     for from_deg in [0.0, 77.0, 200.0, 311.0] {
         let line = format!("start --machine {} --from-deg {from_deg} {flaws}", folder.path().display());
@@ -120,7 +120,7 @@ fn starts_of(values: &str, folder: &TempDir, flaws: &str, most_deg: f64) {
     }
 }
 
-/// A machine without saliency shows no axis. The pulses of unequal lengths, which added up, turned its rotor again and again, and none of them ended it.
+/// A machine without saliency shows no axis. The pulses of unequal lengths added up and turned its rotor again and again, and none of them ended the start.
 #[test]
 fn a_machine_without_an_axis_is_told_and_not_turned() {
     let folder = made(

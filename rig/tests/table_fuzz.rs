@@ -1,5 +1,5 @@
 //! Anything as a table from the user: a good CSV of operating points, or another tool's flux map, with something changed. It is refused in
-//! one line that names the file and a line of it, or it is read, and every number that comes of it is one.
+//! one line that names the file and a line of it, or it is read, and every resulting value is a number.
 //!
 //! `TRACTIVE_FUZZ_CASES=100000 cargo test --release -p tractive-rig --test table_fuzz` tries longer.
 
@@ -70,7 +70,7 @@ static MAP: LazyLock<String> = LazyLock::new(|| SMALL.truth.map(&axis(-20.0, 5.0
 proptest! {
     #![proptest_config(config(500))]
 
-    /// A map that is read ends before the largest current, and is refused for that alone: what makes tables of it has tests of its own.
+    /// A map that is read ends before the largest current, and is refused for that alone: the making of tables from it has tests of its own.
     #[test]
     fn a_good_map_of_another_tool_with_something_changed(changes in prop::collection::vec(change(), 0..3)) {
         let folder = tempfile::tempdir()?;

@@ -1,6 +1,6 @@
-//! Temperatures in closed loop, machine and inverter warming as they lose: derating holds what would get too hot, a lost sensor stops the
-//! drive by name and in time, and what the magnets' estimate is worth. Time constants are scaled to seconds, some hundredth of a
-//! machine's.
+//! Temperatures in closed loop, machine and inverter warming by their losses: derating holds any part that would get too hot, a lost
+//! sensor stops the drive by name and in time, and the magnets' estimate is judged. Time constants are scaled to seconds, some hundredth
+//! of a machine's.
 
 mod stiff;
 
@@ -38,7 +38,7 @@ const THERMAL: Thermal = Thermal {
 const BEARING: Thermal =
     Thermal { winding_derating: Derating { from_c: 240.0, none_c: 260.0 }, winding_trip_c: 280.0, ..THERMAL };
 
-/// A stator that the largest current would warm by 250 K, and a heat sink that it would hardly.
+/// A stator that the largest current would warm by 250 K, and a heat sink that it would hardly warm.
 const HEAT: HeatSettings = HeatSettings {
     coolant_c: 40.0,
     hottest: Node { j_per_k: WINDING.1 / WINDING.0, k_per_w: WINDING.0 },
@@ -116,7 +116,7 @@ fn last_nm(recording: &Recording) -> f64 {
     last.iter().map(|row| row.te_nm).sum::<f64>() / last.len() as f64
 }
 
-/// Mean share of torque that is told over the same time: a sensor's conversion has steps, and between two of them it goes to and fro.
+/// Mean reported share of torque over the same time: a sensor's conversion has steps, and the share goes to and fro between two of them.
 fn last_share(recording: &Recording) -> f64 {
     let last = &recording.slots[recording.slots.len() - 1_000..];
     let shares = last.iter().map(|slot| f64::from(slot.status.temperatures.unwrap().torque_share));
@@ -157,7 +157,7 @@ fn a_long_overload_derates_and_trips_nothing() {
     assert!((torque_nm / 1_235.0 - torque_share).abs() < 0.01 && torque_share > 0.3);
 }
 
-/// Blocked at full torque one phase has the peak of the current: its junction is the one that is told.
+/// With the rotor blocked at full torque, one phase carries the peak of the current: its junction is the one that is reported.
 #[test]
 fn a_blocked_rotor_is_held_by_its_hottest_junction() {
     // No stator that gets hot, and a heat sink that does.
@@ -214,7 +214,7 @@ fn a_lost_sensor_stops_the_drive_by_its_own_name_in_time() {
     }
 }
 
-/// With the gates on at 2,000 r/min, magnets at a temperature: what is told of them, and the torque.
+/// The reported temperature of the magnets and the torque, with the gates on at 2,000 r/min and the magnets at a temperature.
 fn magnets(magnets_c: f64, torque_nm: f64, flux_scale: f64) -> (Option<f32>, f64) {
     let heat = Heat::new(HeatSettings { magnets_c, magnets_per_k: -1e-3, ..HEAT });
     let (recording, _) = run(Run {
@@ -245,7 +245,7 @@ fn magnets_are_told_without_a_current_and_not_with_one() {
     assert!((told_c - 90.0).abs() < 3.0, "{told_c} °C");
 }
 
-/// Torque in N·m after two seconds without, in which the drive has learned the magnets' temperature; the winding is as warm as they are.
+/// Torque in N·m after two seconds without torque, in which the drive has learned the magnets' temperature; the winding is as warm as they are.
 fn warm_nm(celsius: f64, rpm: f64, torque_nm: f64) -> f64 {
     let stator = Node { j_per_k: 1e9, ..HEAT.stator };
     let mut heat = Heat::new(HeatSettings { magnets_c: celsius, magnets_per_k: -1e-3, stator, ..HEAT });
@@ -263,7 +263,7 @@ fn warm_nm(celsius: f64, rpm: f64, torque_nm: f64) -> f64 {
     last_nm(&recording)
 }
 
-/// Control knows resistance and magnets at their temperatures where the drive has coasted: torque is the demand's at any, motoring and braking.
+/// Control knows resistance and magnets at their temperatures once the drive has coasted: torque is as demanded at any temperature, motoring and braking.
 #[test]
 fn torque_is_within_two_percent_at_every_temperature_that_is_known() {
     let mut worst = 0.0_f64;

@@ -50,8 +50,8 @@ fn demand_released_in_deep_weakening() {
     }
 }
 
-/// Braking has been let go in square wave, and then the line rises until the voltage forces more flux upon the machine than its
-/// magnets have: the machine stays on the side of the flux circle on which it is.
+/// Braking is released in square wave, and then the line rises until the voltage forces more flux upon the machine than its
+/// magnets have: the machine stays on its side of the flux circle.
 #[test]
 fn line_rises_in_square_wave_without_torque() {
     for torque_nm in [FULL_NM, -FULL_NM] {

@@ -23,7 +23,7 @@ fn dead_time_is_kept_and_stops_nothing() {
     }
 }
 
-/// The guide's table: torque and distortion with the dead time, distortion without it, and both where nothing makes up for it.
+/// The guide's table: torque and distortion with the dead time, distortion without it, and both without compensation.
 #[test]
 fn the_guide_says_what_dead_time_costs_with_and_without_compensation() {
     const PAGE: &str = include_str!("../../docs/papers.md");

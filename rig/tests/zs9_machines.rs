@@ -121,7 +121,7 @@ fn refused(line: &str, words: &[&str]) {
     assert!(words.iter().all(|word| said.contains(word)), "{line}: no {words:?} in {said}");
 }
 
-/// A load that the machine cannot carry, and machines that the drive cannot have, are refused by what their user has.
+/// A load that the machine cannot carry, and machines that the drive cannot have, are refused by the user's own option or key.
 #[test]
 fn what_the_zs9_cannot_have_is_refused_by_the_users_own_key() {
     refused("run zs9-load-step --step 100", &["--step 100", "-180 to 60"]);

@@ -113,7 +113,7 @@ fn terminals(gates: [LegGates; 3], lower: bool, link_v: f64) -> [f64; 3] {
 fn both_motors_agree_with_the_phase_model() {
     const LINK_V: f64 = 2000.0 / 3.0;
     let rpm = [700.0, -500.0];
-    // Capacitors without end: the link stands still, and the motors alone are compared.
+    // Infinite capacitors: the link stays constant, and the motors alone are compared.
     let settings =
         Zs9Settings { network: ZNetwork { capacitance_f: 1e9, ..ZNetwork::ZS9 }, ..Zs9Settings::default() };
     let mut plant = plant_at(rpm, &settings);

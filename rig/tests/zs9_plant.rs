@@ -56,8 +56,8 @@ fn steady_state_is_that_of_the_averaged_network() {
     }
 }
 
-/// The diodes of a bridge whose gates are off hold the link at nothing where the source is gone: the motors are shorted, and no energy
-/// comes from nowhere.
+/// The diodes of a bridge whose gates are off hold the link at zero if the source is gone: the motors are shorted, and no energy comes
+/// from nowhere.
 #[test]
 fn a_shorted_source_shorts_the_motors() {
     let mut plant = plant_at([1300.0, 1000.0], &Zs9Settings::default());
@@ -316,7 +316,8 @@ fn round_plant(rpm: [f64; 2], drops: DeviceDrops) -> Zs9Plant {
     Zs9Plant::new([&machine, &machine], rpm.map(zs9::turning), &settings)
 }
 
-/// Against a simulation by nodes, with every switch a resistor of 5 mΩ: the same pulses, the same beginning. Without these resistances the capacitors' voltage is 0.3 % off.
+/// Against a nodal simulation with every switch a resistor of 5 mΩ, from the same pulses and the same beginning. Without these resistances the
+/// capacitors' voltage is 0.3 % off.
 #[test]
 fn with_resistive_switches_the_network_is_that_of_the_circuit() {
     const RPM: [f64; 2] = [500.0, 420.0];
@@ -368,7 +369,7 @@ fn with_resistive_switches_the_network_is_that_of_the_circuit() {
     assert!((inductors[0] - circuit.state[0]).abs() < 0.02, "{inductors:?} A, {} A", circuit.state[0]);
 }
 
-/// With thresholds and slopes, and several legs that short the link at once: what the devices take is heat, and none is lost.
+/// With thresholds and slopes, and several legs that short the link at once: the power taken by the devices is heat, and none is lost.
 #[test]
 fn energy_is_kept_with_drops() {
     let drops = DeviceDrops { igbt_v: 1.5, igbt_ohm: 0.01, diode_v: 1.0, diode_ohm: 0.006 };
@@ -388,7 +389,8 @@ fn energy_is_kept_with_drops() {
     assert!(residual.abs() < 1e-4 * energies.devices_j, "{residual} J");
 }
 
-/// While the source's diode blocks, the link stands where the network's own equation has it: `U_in = v1 + v2 − u_s`, `2 u_s = L d(i1 + i2)/dt + v1 + v2 + r (i1 + i2)`.
+/// While the source's diode blocks, the link stands at the voltage of the network's own equation: `U_in = v1 + v2 − u_s`, `2 u_s = L d(i1 + i2)/dt +
+/// v1 + v2 + r (i1 + i2)`.
 #[test]
 fn while_the_sources_diode_blocks_the_link_is_the_networks() {
     let mut plant = plant_at([0.0; 2], &Zs9Settings { source: Source::Diode, ..Zs9Settings::default() });

@@ -11,8 +11,8 @@ const WIDE_RPM: f64 = 50.0;
 /// Share of the demand by which a bin's mean torque may be off.
 const MOST: f64 = 0.01;
 
-/// While both motors speed up with full torque. What the resistance and the devices took was learnt as flux linkage, and up to a third of the torque was missing
-/// at 50 r/min; so was what a dead time leaves that is told, by up to 40 % at 300 r/min, or it was a fault at 20 kHz.
+/// While both motors speed up with full torque. The voltage of the resistance and the devices was once learnt as flux linkage, and up to a third of
+/// the torque was missing at 50 r/min; so was the residue of a dead time that is told, by up to 40 % at 300 r/min, or it was a fault at 20 kHz.
 #[test]
 fn torque_is_the_demand_from_standstill_on() {
     let flaws = [

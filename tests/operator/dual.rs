@@ -311,7 +311,7 @@ fn either_motors_current_and_speed_count() {
     }
 }
 
-/// The mean of the torque that has held a speed: of a step a part in 51 is left behind with every slot.
+/// The torque that has held a speed is a mean: each slot takes up a part in 51 of the rest of a step.
 #[test]
 fn the_torque_that_holds_a_speed_is_a_mean() {
     let mut world = World::enabled();

@@ -239,7 +239,7 @@ fn a_drive_is_enabled_from_the_lowest_operating_voltage_on_and_trips_below_its_l
 
 #[test]
 fn a_machine_that_turns_is_not_discharged_nor_stopped_beyond_its_emf() {
-    // Where the EMF is just that of an empty link it may be discharged still.
+    // With an EMF of exactly an empty link's voltage, it may still be discharged.
     let slow = 70.0_f32;
     for (omega, refusal) in [(slow, None), (-slow, None), (slow.next_up(), Some(Refusal::MachineTurning))] {
         let mut world = World::charged();
@@ -248,7 +248,7 @@ fn a_machine_that_turns_is_not_discharged_nor_stopped_beyond_its_emf() {
         world.observed.omega = omega;
         assert_eq!(world.edge(|request, level| request.discharge = level).status.refusal, refusal, "{omega}");
     }
-    // At 0.9 of the nominal link open gates are safe still, whatever the link is.
+    // At 0.9 of the nominal link voltage, open gates are still safe, whatever the link's voltage is.
     let emf_v = |omega: f32| omega * tractive::frames::SQRT_3 * RATINGS.magnet_flux_wb;
     let all = (1_700.0_f32.to_bits()..1_800.0_f32.to_bits()).map(f32::from_bits);
     let open = all.filter(|omega| emf_v(*omega) <= 0.9 * RATINGS.dc_link_nominal_v).fold(0.0, f32::max);
@@ -320,7 +320,7 @@ fn every_limit_of_a_request_may_be_as_rated_and_no_more() {
             assert_eq!(world.output().status.refusals, refusals, "{value}");
         }
     }
-    // What is no number, in each value by itself.
+    // Not a number, in each value by itself.
     let all: [fn(&mut Request) -> &mut f32; 6] = [
         |request| &mut request.torque_nm,
         |request| &mut request.limits.motoring_nm,
@@ -337,8 +337,8 @@ fn every_limit_of_a_request_may_be_as_rated_and_no_more() {
     }
 }
 
-/// Levels of a link of 1,000 to 1,800 V that trips at 850 and 2,070 V: motoring ends half way to the lower one, braking at 0.6 of the way to the
-/// upper one and over half of that; the line's voltage ends it sooner.
+/// Levels of a link of 1,000 to 1,800 V that trips at 850 and 2,070 V: motoring ends half way to the lower one; braking ends at 0.6 of the way
+/// to the upper one and fades over half of that; the line's voltage ends motoring sooner.
 #[test]
 fn the_window_of_the_link_is_that_of_the_ratings_and_of_the_line() {
     let mut world = World::enabled();
@@ -375,7 +375,7 @@ fn the_window_of_the_link_is_that_of_the_ratings_and_of_the_line() {
     }
 }
 
-/// Half way between the two ends half of the largest torque is left.
+/// Half way between the two ends, half of the largest torque is left.
 #[test]
 fn motoring_fades_along_a_straight_line() {
     let mut world = World::enabled();
@@ -390,13 +390,13 @@ fn motoring_fades_along_a_straight_line() {
     let wanted_nm = share * RATINGS.max_torque_nm;
     assert!((0.5..0.6).contains(&share));
     assert!((world.output().command.demand.torque_nm - wanted_nm).abs() < 2.0, "{wanted_nm}");
-    // A rotor that stands turns forward as far as limits go: backward torque brakes, and the link does not limit it.
+    // For the limits, a rotor at rest turns forward: backward torque brakes, and the link does not limit it.
     (world.observed.omega, world.request.torque_nm) = (0.0, -1_000.0);
     world.slots(500);
     assert_eq!(world.output().command.demand.torque_nm, -1_000.0);
 }
 
-/// The limits that held go on where the values of a request are none, also while the gates are off.
+/// The limits in force stay in force if the values of a request are no numbers, also while the gates are off.
 #[test]
 fn limits_outlast_what_is_refused() {
     let mut world = World::charged();

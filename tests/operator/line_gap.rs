@@ -51,7 +51,7 @@ fn torque_returns_on_a_line_that_has_sagged() {
     assert_eq!(demand_nm(&world), 400.0);
 }
 
-/// Braking lifts a link behind a rectifier: that is not the line.
+/// Braking lifts a link behind a rectifier: that rise is not the line's.
 #[test]
 fn a_link_that_braking_has_lifted_is_not_taken_for_the_line() {
     let mut world = turning(900.0);

@@ -1,4 +1,4 @@
-//! Temperatures: sensors that are lost, torque that goes as parts get hot, and what trips in the end.
+//! Temperatures: sensors that are lost, torque that is reduced as parts get hot, and the trips in the end.
 
 use crate::world::{SLOT_S, World};
 use proptest::prelude::*;
@@ -255,8 +255,8 @@ fn number(most: f32) -> impl Strategy<Value = f32> {
 }
 
 proptest! {
-    /// Whatever the sensors show and the drive reports: a share of the torque, temperatures that are numbers, and a sensor that is wrong for long
-    /// enough is told.
+    /// Whatever the sensors show and the drive reports, the result is a share of the torque and temperatures that are numbers, and a sensor that
+    /// is wrong for long enough is told.
     #[test]
     fn no_sequence_of_readings_leaves_what_is_promised(
         slots in proptest::collection::vec((any::<u16>(), any::<u16>(), number(1e3), number(1.0)), 1..40),

@@ -1,5 +1,5 @@
-//! The bus as an adversary has it: what is followed of recordings, of a second master and of a node that babbles. What the protection cannot
-//! tell is held here as well, and `docs/protocol.md` says it.
+//! The bus in the hands of an adversary: how far the drive follows recordings, a second master and a babbling node. Cases that the
+//! protection cannot tell apart are tested here as well, and `docs/protocol.md` names them.
 
 use crate::Stream;
 use tractive::built_in::traction::BUILT_IN;
@@ -69,13 +69,13 @@ fn an_old_frame_is_taken_where_the_counter_cannot_tell_its_age_and_nowhere_else(
         let mut receiver = receiver;
         let is_taken = receiver.receive(old, Scales::USUAL).is_ok();
         assert_eq!(is_taken, age % 16 >= 13, "{age}");
-        // What it costs the true sender.
+        // The cost to the true sender.
         let lost = coming.iter().filter(|frame| receiver.receive(frame, Scales::USUAL).is_err()).count();
         assert_eq!(lost, if is_taken { 16 - age % 16 } else { 0 }, "{age}");
     }
 }
 
-/// The whole of a recorded start is followed after a reset: to the drive nothing tells it from the sender's own.
+/// The whole of a recorded start is followed after a reset: the drive cannot tell it from the sender's own.
 #[test]
 fn a_recording_from_rest_on_is_followed_after_a_reset_and_none_that_begins_later() {
     let recorded = recording(&mut Stream::of(&COMMAND));
@@ -139,7 +139,7 @@ fn of_two_masters_in_step_one_is_followed_and_the_others_frames_are_counted() {
             }
         }
         let counts = session.counts();
-        // The second one takes over where it is ahead by no more than what may be lost.
+        // The second one takes over if it is ahead by no more frames than may be lost.
         let wins = if (1..=3).contains(&ahead) { -100.0 } else { 100.0 };
         assert!(torques[2..].iter().all(|torque_nm| *torque_nm == wins), "{ahead}: {torques:?}");
         let rejected = counts.repeated + counts.disordered - before.repeated - before.disordered;
@@ -147,7 +147,7 @@ fn of_two_masters_in_step_one_is_followed_and_the_others_frames_are_counted() {
     }
 }
 
-/// Their counters slide past each other: now the one is followed, now the other. The drive cannot know which is the right one; the supervisor
+/// Their counters drift past each other: the drive follows now the one, now the other. It cannot know which is the right one; the supervisor
 /// sees it in the counts.
 #[test]
 fn two_masters_out_of_step_are_followed_by_turns_and_seen_within_a_tenth_of_a_second() {
@@ -173,7 +173,7 @@ fn two_masters_out_of_step_are_followed_by_turns_and_seen_within_a_tenth_of_a_se
     }
 }
 
-/// Its counter is next once in each round of the true sender's: then it is followed until that one has come past it.
+/// Its counter is the next one due once in each round of the true sender's: then it is followed until the true sender's has passed it.
 #[test]
 fn a_node_that_repeats_a_frame_without_end_is_followed_a_quarter_of_the_time_and_alone_not_at_all() {
     let mut stream = Stream::of(&COMMAND);
@@ -198,8 +198,8 @@ fn a_node_that_repeats_a_frame_without_end_is_followed_a_quarter_of_the_time_and
     }
 }
 
-/// Of frames of random bits one in 256 has a right CRC, and some of those a counter that is next. A command's unused bits are what they
-/// then fail by; but they take the counter along, and the true sender's frames are lost by it until a silence.
+/// Of frames of random bits, one in 256 has a valid CRC, and some of those have the counter that is due. They then fail by a command's
+/// unused bits; but they advance the counter, and so the true sender's frames are lost until a silence.
 #[test]
 fn a_node_that_babbles_at_random_commands_nothing_and_at_worst_there_is_no_torque() {
     let (mut stream, mut noise) = (Stream::of(&COMMAND), Noise(0x9E37_79B9_7F4A_7C15));
@@ -262,7 +262,7 @@ fn a_flood_of_requests_moves_no_telemetry() {
     assert_eq!(answers.len(), 400);
 }
 
-/// A bus-off is left after 100 ms; so long nothing is heard.
+/// A bus-off ends after 100 ms; until then nothing is heard.
 #[test]
 fn a_bus_off_takes_the_torque_and_the_second_frame_behind_it_brings_it_back() {
     let mut stream = Stream::of(&COMMAND);

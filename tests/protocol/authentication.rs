@@ -59,7 +59,7 @@ fn a_drive_without_a_guard_refuses_a_tag() {
     assert_eq!([receive(), receive()], [Ok(Content::Greeting), Err(Reject::OutOfRange)]);
 }
 
-/// A CRC anybody can make, a tag the holder of the key alone.
+/// Anybody can make a CRC, but only the holder of the key a tag.
 #[test]
 fn a_frame_with_any_bit_changed_is_refused_even_with_a_right_crc() {
     let (mut signer, mut guard) = ends();

@@ -1,4 +1,4 @@
-//! Message sets: the request that they make of what was sent, every level by itself, armed and not.
+//! Message sets: the request that they make from what was sent, every level by itself, armed and not.
 
 use tractive::built_in::traction::BUILT_IN;
 use tractive::built_in::zs9;

@@ -39,8 +39,8 @@ fn rated(ratings: &Ratings, signal: &Signal) -> [f32; 2] {
     }
 }
 
-/// Rounding costs 0.1 % of a rating at most, and what trips the drive can still be told, on every machine of tables/ and on such as
-/// are a thousand times smaller and larger.
+/// Rounding costs 0.1 % of a rating at most, and values that trip the drive can still be told, on every machine of tables/ and on
+/// machines that are a thousand times smaller and larger.
 #[test]
 fn rounding_is_small_beside_the_ratings() {
     let mut machines = machines();
@@ -134,7 +134,7 @@ fn the_zs9_counts_in_its_machines_steps() {
     }
 }
 
-/// Whatever two machines' steps differ in, some message tells.
+/// Any difference between two machines' steps is told by some message.
 #[test]
 fn steps_that_differ_are_told() {
     let usual = Scales::USUAL;
@@ -192,7 +192,7 @@ fn spoken(scales: Scales) -> Vec<[Frame; 2]> {
         .to_vec()
 }
 
-/// The drive takes nothing of a host on other scales, and counts it as out of range; nor a host of such a drive.
+/// The drive takes nothing from a host on other scales, and counts it as out of range; nor does a host take anything from such a drive.
 #[test]
 fn who_counts_in_other_steps_is_not_misread() {
     let own = [Scales::of(&BUILT_IN.ratings), Scales::of(&tables("pmsm-48v-1kw").ratings)];

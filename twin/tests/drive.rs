@@ -79,7 +79,7 @@ fn the_stack_suffices(cpu: &Cpu, image: &Image) {
 }
 
 /// Each interrupt ends before its deadline, in cycles, with every wait state and those of the tables; and the PWM's preempts everything: it comes
-/// behind the block of instructions that runs.
+/// after the block of instructions that is running.
 fn interrupts_are_in_time(cpu: &Cpu, deadlines: &[(usize, u64)]) {
     for (exception, deadline) in deadlines {
         let longest = cpu.longest[exception];

@@ -27,7 +27,7 @@ fn within(cause: Cause) -> Option<Time> {
     }
 }
 
-/// The time within which contactors, discharge resistor and chopper are off; `None` where the operator's word is waited for, or nothing
+/// The time within which contactors, discharge resistor and chopper are off; `None` if they wait for the operator's word, or nothing
 /// happens to them.
 fn lines_within(cause: Cause, when: When) -> Option<Time> {
     match cause {
@@ -44,7 +44,7 @@ fn lines_within(cause: Cause, when: When) -> Option<Time> {
 fn told(system: System, cause: Cause, when: When, seen: &Seen) -> bool {
     let told = seen.told.as_str();
     match cause {
-        // The watchdog is the start's last step: before it nobody tells anything, but for who is reset.
+        // The watchdog is the start's last step: before it nothing is told, except after a reset.
         Cause::BrownOut if matches!(when, When::Starting(_)) => {
             ["self_test", "ready"].contains(&told) && seen.resets == 1
         }
@@ -54,7 +54,7 @@ fn told(system: System, cause: Cause, when: When, seen: &Seen) -> bool {
         Cause::Overcurrent => ["fault hardware_overcurrent", "fault overcurrent"].contains(&told),
         Cause::Hang | Cause::Debugger | Cause::HardFault => told == "fault start_refused" && seen.resets == 1,
         // The diodes still carry the turning motors' current when the start looks for the sensors' zeros: reason 10.
-        // Without torque it may have died away by then: that turns on 0.2 ms of the idle loop.
+        // Without torque it may have died away by then: that depends on 0.2 ms of the idle loop.
         Cause::BrownOut if system == System::Zs9 && seen.pulsed => {
             let is_found = matches!(when, When::Enabled) && told == "ready";
             (is_found || told == "fault start_refused") && seen.resets == 1

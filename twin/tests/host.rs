@@ -1,4 +1,4 @@
-//! The edges at the pins beside those that the drive makes on the host of the same inputs. The images are those which
+//! The edges at the pins beside those that the drive makes on the host from the same inputs. The images are those which
 //! `TRACTIVE_NUCLEO_IMAGE` and `TRACTIVE_NUCLEO_ZS9_IMAGE` name.
 
 mod prepared;

@@ -83,7 +83,7 @@ fn described(peripheral: &str) -> [&'static [Published]; 2] {
     }
 }
 
-/// Registers whose value after a reset is another one in the reference manual than in the description: the manual's.
+/// Registers whose value after a reset differs between the reference manual and the description: the manual's.
 const OTHERWISE: [(&str, u32, u32); 10] = [
     // RM0440, 7.4.1: the internal oscillator is on and ready. The description has a relative's trimming there.
     ("RCC", 0x00, 0x0500),

@@ -93,7 +93,7 @@ fn every_key_is_refused_by_name_and_line() {
             };
             for bad in nonsense {
                 let said = stage.refused(&key, bad);
-                // What is no such number is told by the parser, with the line alone.
+                // A value that is no such number is refused by the parser, which names the line alone.
                 assert!(
                     said.starts_with(&format!("{key}: ")) || said.starts_with("invalid "),
                     "{key} = {bad}: {said}"
@@ -327,7 +327,7 @@ fn a_large_machine_needs_large_sensors_and_comparators() {
 #[test]
 fn times_suit_each_other_the_timers_and_the_carrier() {
     for (key, value) in [
-        // The generator makes 5,036 ns of 5 µs: nothing would be left of such a pulse.
+        // The generator makes 5,036 ns of 5 µs: such a pulse would vanish.
         ("min_pulse_ns", "5036"),
         ("min_pulse_ns", "4000"),
         // Half of the shortest carrier half is 278 µs.

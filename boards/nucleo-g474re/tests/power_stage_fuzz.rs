@@ -1,5 +1,5 @@
-//! A good power stage with something changed: it is refused in one line that names the file and its line, or it is a stage in which
-//! every number is one.
+//! A good power stage with something changed: it is refused in one line that names the file and its line, or it is a stage whose
+//! values are all numbers.
 //!
 //! `TRACTIVE_FUZZ_CASES=100000 cargo test --release -p tractive-nucleo-g474re --test power_stage_fuzz` tries longer.
 

@@ -13,7 +13,7 @@ pub struct Truth {
     pub max_current_a: f64,
 }
 
-/// The question: an electrical speed, and the voltage there is.
+/// The question: an electrical speed, and the available voltage.
 #[derive(Clone, Copy)]
 pub struct Supply {
     pub omega: f64,

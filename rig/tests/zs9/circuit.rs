@@ -1,5 +1,5 @@
-//! The ZS9's circuit once more, by nodes: nine switches and the source's as resistors, on or off, two motors of round rotors, whose currents stand in the
-//! stationary frame. Nothing of it is the plant's.
+//! The ZS9's circuit once more, by nodes: nine switches and the source's as resistors, on or off, and two motors of round rotors, with currents in
+//! the stationary frame. It shares nothing with the plant.
 
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::TAU;

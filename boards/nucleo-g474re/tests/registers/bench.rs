@@ -1,5 +1,5 @@
 //! Register blocks in ordinary memory, and as much of the hardware behind them as the board relies on: preload, update events,
-//! the combined PWM modes, the dead-time generator, the main output, breaks. After the reference manual, not the board.
+//! the combined PWM modes, the dead-time generator, the main output, breaks. Modelled on the reference manual, not on the board.
 
 use nucleo_g474re::legs::Legs;
 use nucleo_g474re::registers::Registers;
@@ -33,14 +33,14 @@ pub fn written(port: pac::gpio::Gpio) -> u32 {
     unsafe { port.as_ptr().cast::<u32>().add(6).read_volatile() }
 }
 
-/// The same; the memory is emptied.
+/// The same; clears the memory.
 pub fn take_written(port: pac::gpio::Gpio) -> u32 {
     // SAFETY: as above.
     unsafe { port.as_ptr().cast::<u32>().add(6).replace(0) }
 }
 
-/// Counts an encoder whose shaft has turned, in turns from its index on, as the timer does that counts it: from 0 behind the index, whose flag it
-/// sets where the drive looks at it.
+/// Counts an encoder whose shaft has turned (turns from its index on) as its timer does: from 0 behind the index, whose flag it sets where the
+/// drive looks for it.
 pub fn turn_encoder(timer: pac::timer::TimGp16, per_turn: u32, [before, now]: [f64; 2], count: &mut f64) {
     let counts = f64::from(per_turn);
     let passed = before.floor() != now.floor();
@@ -144,7 +144,7 @@ pub struct Bench {
     status: [u32; 2],
     shadows: [Shadow; 2],
     count: [u32; 2],
-    /// The timers play a two-level inverter; otherwise the bench leaves them alone but for their break inputs.
+    /// The timers play a two-level inverter; otherwise the bench drives only their break inputs.
     pub two_level: bool,
     /// Time, in ns: ticks of the timers, and waits.
     pub time_ns: u64,
@@ -252,7 +252,7 @@ impl Bench {
             let events = core::mem::take(egr);
             if events & 1 != 0 {
                 self.update(index);
-                // URS: an update by software is no interrupt, but TRGO it is.
+                // URS: an update by software raises no interrupt, but it does raise TRGO.
                 if index == 0 && timer.cr2().read().mms() == pac::timer::vals::Mms::UPDATE {
                     self.trigger();
                 }
@@ -292,13 +292,13 @@ impl Bench {
         };
     }
 
-    /// One tick of both PWM timers; whether TIM1 has had an update that is an interrupt.
+    /// One tick of both PWM timers; true if TIM1 has had an update that raises an interrupt.
     pub fn tick(&mut self) -> bool {
         self.settle();
         self.now += 1;
         self.time_ns += 47;
         let mut updated = false;
-        // TIM8 first: what TIM1 resets has not counted in the same tick.
+        // TIM8 first: a counter that TIM1 resets has not counted in the same tick.
         for (index, timer) in self.timers().into_iter().enumerate().rev() {
             if !timer.cr1().read().cen() {
                 continue;
@@ -386,7 +386,7 @@ impl Bench {
         }
     }
 
-    /// 5 µs at 21.25 MHz, not rounded up: what the power stage asks for.
+    /// Dead time that the power stage asks for: 5 µs at 21.25 MHz, not rounded up.
     fn dead_time_ticks(&self) -> u32 {
         106
     }

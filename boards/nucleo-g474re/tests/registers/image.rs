@@ -63,7 +63,7 @@ impl Machine {
         torque_nm(&BUILT_IN, flux_linkage(&BUILT_IN, self.current), self.current)
     }
 
-    /// The shaft and the windings over a step: the flux that the legs make, and the current that has this flux on the machine's own map.
+    /// Moves the shaft and the windings by a step: the legs make the flux, and the current is the one that has this flux on the machine's own map.
     fn step(&mut self, udc_v: f32, seconds: f32) {
         self.turns += self.rpm / 60.0 * f64::from(seconds);
         let frame = self.angle().sin_cos();
@@ -104,9 +104,9 @@ fn current_of(flux: Dq, mut near: Dq) -> Dq {
     near
 }
 
-/// The PWM interrupt's port, with the hardware's turn after each write. Status flags are cleared by writing 0 and left alone by writing 1, and
-/// a break's flag stays set while its input is active (RM0440, TIMx_SR: rc_w0); an event acts before the next write. In memory a flag
-/// would be what was written, and an event would wait.
+/// The PWM interrupt's port, which lets the hardware act after each write. Status flags are cleared by writing 0 and left alone by writing 1,
+/// and a break's flag stays set while its input is active (RM0440, TIMx_SR: rc_w0); an event acts before the next write. In plain memory a
+/// flag would hold what was written, and an event would wait.
 struct Port<'a> {
     pwm: &'a mut Pwm,
     bench: &'a mut Bench,
@@ -174,7 +174,7 @@ struct Image {
 }
 
 impl Image {
-    /// From a reset on, with the rotor there and this fast.
+    /// The image from a reset on, with the rotor at this position and speed.
     fn reset(turns: f64, rpm: f64, zero: Angle) -> Self {
         let mut bench = Bench::new();
         let registers = bench.registers;
@@ -255,8 +255,8 @@ impl Image {
         self.bench.codes[6] = (self.udc_v / POWER_STAGE.udc_v_per_code).round() as u16;
     }
 
-    /// The line side over a control period. Memory keeps only the last of several writes to a set-and-reset register: the contactors go by the
-    /// drive's own status, and the tests of the switchgear look at the pins.
+    /// The line side over a control period. Memory keeps only the last of several writes to a set-and-reset register, so the contactors follow
+    /// the drive's own status here; the tests of the switchgear look at the pins.
     fn line(&mut self) {
         let [precharge, main, discharge] = self.heard.map_or([false; 3], |heard| heard.switches);
         for (contact, told) in self.told.iter_mut().zip([precharge, main]) {
@@ -302,7 +302,7 @@ impl Image {
             for ((sum, leg), current_a) in self.machine.levels.iter_mut().zip(&self.bench.legs).zip(phases) {
                 let (upper, lower) = leg.gates();
                 self.machine.pulsed |= upper || lower;
-                // In the dead time the current finds its diode.
+                // During the dead time the current flows through its diode.
                 *sum += u64::from(upper || !lower && current_a < 0.0);
             }
             if tick % STEP_TICKS == 0 {
@@ -395,7 +395,7 @@ fn pulls(image: &mut Image) {
     assert!((198.0..202.0).contains(&torque_nm), "{torque_nm} N·m");
 }
 
-/// A fault, which stays until it is acknowledged, and cannot be while its cause lasts; and from there to torque again.
+/// A fault, which stays until it is acknowledged and cannot be acknowledged while its cause lasts; then torque again.
 fn fails(image: &mut Image, fault: Fault, spoil: fn(&mut Image), mend: fn(&mut Image)) {
     spoil(image);
     image.run_ms(1);
@@ -521,7 +521,7 @@ fn five_messages_back_to_back_are_all_taken() {
     }
 }
 
-/// Five frames of eight bytes in a millisecond, or ten without a byte: the most that 500 kbit/s carry, in front of the vehicle's computer's.
+/// Five frames of eight bytes in a millisecond, or ten without a byte: the most that 500 kbit/s carry, ahead of the vehicle's computer's.
 #[test]
 fn a_drive_on_a_bus_that_is_full_goes_on() {
     let mut image = Image::reset(0.3, 600.0, Angle::ZERO);

@@ -116,7 +116,7 @@ fn a_resolver_tells_every_angle_whatever_the_converters_offset() {
     }
 }
 
-/// A wire that is open stands still: without a look at the range the other winding alone would be an angle.
+/// An open wire stays constant: without a check of the range, the other winding alone would be an angle.
 #[test]
 fn a_wire_that_is_pulled_to_an_end_of_the_range_is_no_winding() {
     let (mut bench, mut sensor) = prepared::<Wound>();

@@ -33,8 +33,8 @@ const CONTACTOR_PERIODS: u64 = 50;
 /// Longest time between two meals of the watchdog, in control periods: 20 ms.
 const HUNGER: u64 = 200;
 
-/// The PWM interrupt's port, with the driver board's latches in place of the serial words, which memory cannot shift, and with the hardware's
-/// turn after each write, as in the other image.
+/// The PWM interrupt's port, with the driver board's latches in place of the serial words, which memory cannot shift. It lets the hardware
+/// act after each write, as in the other image.
 struct Port<'a> {
     pwm: &'a mut Pwm,
     model: &'a mut Model,
@@ -274,7 +274,7 @@ fn pulls(image: &mut Image) {
     assert!((upper - 10.0).abs() < 0.1 && (lower + 10.0).abs() < 0.1, "{upper} and {lower} N·m");
 }
 
-/// A fault, which stays until it is acknowledged, and cannot be while its cause lasts; and from there to torque again.
+/// A fault, which stays until it is acknowledged and cannot be acknowledged while its cause lasts; then torque again.
 fn fails(image: &mut Image, fault: Fault, spoil: fn(&mut Image), mend: fn(&mut Image)) {
     spoil(image);
     image.run_ms(1);

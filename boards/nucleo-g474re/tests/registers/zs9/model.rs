@@ -1,5 +1,5 @@
 //! As much of three up-down timers as the bridge relies on: preload, updates at peak and valley, PWM and combined modes, the
-//! dead-time generators, the main outputs, breaks. After the reference manual, not the board.
+//! dead-time generators, the main outputs, breaks. Modelled on the reference manual, not on the board.
 
 use crate::bench::{Bench, dead_cycles};
 use nucleo_g474re::registers::Registers;
@@ -60,8 +60,8 @@ impl Output {
 /// The channels of a leg's gates H, M, L.
 const CHANNELS: [usize; 3] = [0, 2, 1];
 
-/// Longest time for which a leg may have a node on no rail: around a valley or a peak it passes at most three states that are each too
-/// short for the dead time, and then waits for it.
+/// Longest time for which a leg may have a node on no rail: around a valley or a peak it passes through at most three states that are
+/// each too short for the dead time, and then waits out the dead time.
 const MOST_FLOATING_DEAD_TIMES: u64 = 4;
 
 /// The three timers and nine gates.
@@ -96,7 +96,7 @@ impl Model {
             shorted: [0; 2],
             short: [false; 2],
         };
-        // Followers take over what is preloaded at once, by their own update.
+        // Followers take over preloaded values at once, by their own update.
         for (index, timer) in model.pac().into_iter().enumerate().skip(1) {
             assert!(timer.egr().read_update(), "timer {index} starts with what a reset left");
         }
@@ -139,7 +139,7 @@ impl Model {
         self.drive(true);
     }
 
-    /// One cycle of all timers; whether TIM1 has an interrupt.
+    /// One cycle of all timers; true if TIM1 has an interrupt.
     pub fn tick(&mut self) -> bool {
         self.now += 1;
         let mut interrupt = false;
@@ -175,7 +175,7 @@ impl Model {
         (self.timers[0].count, self.timers[0].down)
     }
 
-    /// Drives the gates of every leg after a call of the board, otherwise of those that change.
+    /// Drives the gates of every leg after a call of the board, otherwise only of those that change.
     fn drive(&mut self, called: bool) {
         let mut changed = false;
         for leg in 0..3 {
