@@ -619,7 +619,6 @@ fn the_map_goes_on_with_its_bend_where_ripple_is() {
     assert!(worst_wb < 0.005 * largest_wb, "{worst_wb} of {largest_wb} Wb");
 }
 
-/// A fault in the midst of the experiment: gates off, exit code 1, nothing written beside or in the place of the folder.
 /// A demagnetisation limit is kept by the stairs, the pulses and the turn, and it and the patterns are keys of the folder that comes of them. Without it
 /// the pulses go to 0.96 of the largest current against the magnets' flux.
 #[test]
@@ -697,6 +696,7 @@ fn a_light_rotor_that_turns_away_is_told_what_it_needs() {
     assert_eq!(run(&["--inertia", "0.003"]).status.code(), Some(0));
 }
 
+/// A fault in the midst of the experiment: gates off, exit code 1, nothing written beside or in the place of the folder.
 #[test]
 fn a_fault_ends_the_experiment_with_gates_off_and_nothing_half_written() {
     let machine = Machine::load("pmasynrm-180kw").unwrap();
