@@ -17,8 +17,8 @@ const COUNTED: u32 = 499;
 
 /// Top of the axis of distortion, in %.
 const HIGHEST: f64 = 12.0;
-/// Place of a pattern's name: share of its curve, distance above it in %, and side. The curves fall, so the areas above to the right and
-/// below to the left are free of them.
+/// Place of a pattern's name: share of its curve, distance above it in %, and side. The curves fall: a curve leaves the areas above to its
+/// right and below to its left free.
 fn name_place(name: &str) -> (f64, f64, Side) {
     match name {
         "opp5c" => (0.0, 0.0, Side::Left),
