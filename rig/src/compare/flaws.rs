@@ -1,4 +1,4 @@
-//! The worth of each idealisation of the plant: our law with the flaws of `--real`, one at a time and all at once.
+//! The effect of each idealisation of the plant: our law with the flaws of `--real`, one at a time and all at once.
 
 use super::drive;
 use super::outcome::{Outcome, Outcomes, field, verdict};
@@ -52,7 +52,7 @@ pub const FLAW_HEADS: [&str; 7] = [
     "load steps settle within 2 %",
 ];
 
-/// A row: the flaw, its options, and what came of it in the order of [`FLAW_HEADS`].
+/// A row: the flaw, its options, and its results in the order of [`FLAW_HEADS`].
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct FlawRow {
     /// The flaw.
@@ -119,7 +119,7 @@ fn found(options: &str, driven: &BTreeMap<String, Outcome>, machine: &Machine) -
     ]
 }
 
-/// A number with its unit; the fault where the run tripped.
+/// A number with its unit; the fault if the run tripped.
 fn text(found: Result<Option<f64>, &str>, decimals: usize, unit: &str) -> String {
     match found {
         Ok(Some(value)) => format!("{value:.decimals$} {unit}").replace('-', "−"),

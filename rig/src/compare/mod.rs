@@ -62,7 +62,7 @@ pub fn parts() -> Result<Vec<PartRow>> {
     Ok(parts::found(&plan, &drive(parts::lines(&plan))?, &Machine::load("pmasynrm-180kw")?))
 }
 
-/// All of [`rows`] and [`parts`], of which many runs are the same.
+/// All of [`rows`] and [`parts`], which have many runs in common.
 pub fn rows_and_parts() -> Result<(Vec<Row>, Vec<PartRow>)> {
     let (plan, less) = (planned(&[])?, parts::planned()?);
     let (driven, machine) = (drive(&lines(&plan) | &parts::lines(&less))?, Machine::load("pmasynrm-180kw")?);
@@ -86,7 +86,7 @@ fn judged(plan: &[&Plan], driven: &BTreeMap<String, Outcome>, machine: &Machine)
     plan.iter().map(|row| row.judge(&outcomes)).collect()
 }
 
-/// Runs command lines side by side, and what came of each.
+/// Runs command lines side by side; returns the outcome of each.
 fn drive(lines: BTreeSet<String>) -> Result<BTreeMap<String, Outcome>> {
     let bar = bar(lines.len() as u64, "compare [{bar:40}] {pos}/{len} {elapsed} (left {eta})");
     let driven = lines.into_par_iter().map(|line| {
@@ -114,7 +114,7 @@ fn outcome<S: System>(choice: &Choice<S>) -> Result<Outcome> {
     Ok(Outcome { figures: choice.figures(&recording, &machine), trip })
 }
 
-/// The command. Exit code 1 where a row is not ahead and nothing says why.
+/// The command. Exit code 1 if a row is not ahead and no reason is given.
 pub fn run(options: &CompareOptions) -> Result<ExitCode> {
     options.out.as_deref().map_or(Ok(()), make_folder)?;
     if options.parts {

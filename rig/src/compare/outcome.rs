@@ -1,4 +1,4 @@
-//! The outcome of a law's runs, and the table's rows made of it.
+//! The outcome of a law's runs, and the table's rows made from it.
 
 use crate::analysis::Figures;
 use crate::machine::Machine;
@@ -23,7 +23,7 @@ pub(super) struct Outcomes<'a> {
     pub(super) machine: &'a Machine,
 }
 
-/// A law's result in a row: as it is printed, and its numbers, of which less is better.
+/// A law's result in a row: its printed form, and its numbers; less is better.
 pub(super) struct Cell {
     pub(super) text: String,
     pub(super) values: Vec<f64>,
@@ -36,11 +36,11 @@ pub struct Row {
     pub quantity: &'static str,
     /// The results: the project's own law, then the ordinary one.
     pub found: [String; 2],
-    /// The paper's word on it, if there is one.
+    /// The paper's statement on it, if there is one.
     pub paper: &'static str,
     /// `true` if the project's own law is ahead in each number.
     pub ahead: bool,
-    /// The reason where it is not; empty where none is known.
+    /// The reason if it is not; empty if none is known.
     pub why: &'static str,
 }
 
@@ -70,13 +70,13 @@ impl Outcomes<'_> {
         self.driven.get(&format!("{line} {}", self.more))
     }
 
-    /// The figures of a run; the fault where it tripped.
+    /// The figures of a run; the fault if it tripped.
     pub(super) fn figures(&self, line: &str) -> Result<&Figures, &'static str> {
         let outcome = self.of(line).ok_or("not run")?;
         outcome.trip.map_or(Ok(&outcome.figures), Err)
     }
 
-    /// The numbers of these runs, one after another; the fault where one of them tripped.
+    /// The numbers of these runs, one after another; the fault if one of them tripped.
     pub(super) fn read(
         &self,
         lines: &[&str],
@@ -86,7 +86,7 @@ impl Outcomes<'_> {
     }
 }
 
-/// Numbers behind each other with their unit.
+/// Numbers one after another, with their unit.
 pub(super) fn cell(values: Vec<f64>, count: usize, unit: &str) -> Cell {
     let texts: Vec<_> = values.iter().map(|value| format!("{value:.count$} {unit}")).collect();
     Cell { text: texts.join(", "), values }

@@ -6,13 +6,13 @@ use crate::machine::Machine;
 use anyhow::{Context, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The run that shows what damping is worth: constant power behind a choke.
+/// The run that shows the benefit of damping: constant power behind a choke.
 const BEHIND_CHOKE: &str = "steady --speed 1900 --torque 1200 --line 3,4,30";
 
-/// The run that shows what the integral part is worth.
+/// The run that shows the benefit of the integral part.
 const RESISTIVE: &str = "load-steps --rs-error 50";
 
-/// A row that no comparison of both laws has.
+/// A row that is not in the comparison of both laws.
 const DAMPING: Plan = Plan::of(
     "1,200 N·m at 1,900 r/min behind 3 mH, 4 mF and 30 mΩ: swing of the link",
     || words(&[BEHIND_CHOKE]),
@@ -22,7 +22,7 @@ const DAMPING: Plan = Plan::of(
     },
 );
 
-/// Another: half as much resistance again as the tables have.
+/// Another such row: half as much resistance again as the tables have.
 const RESISTANCE: Plan = Plan::of(
     "half as much resistance again, load steps at 200 r/min: overshoot, within 2 % after",
     || words(&[RESISTIVE]),
@@ -53,7 +53,7 @@ const PARTS: [(&str, &str, &str); 13] = [
     ("damping of the link", "--ablate damping", "1,200 N·m at 1,900 r/min"),
 ];
 
-/// A row: the part, the quantity, and what came of it with the part, without it, and with the papers' ordinary law.
+/// A row: the part, the quantity, and its result with the part, without it, and with the papers' ordinary law.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartRow {
     /// The part that is taken away.
@@ -86,13 +86,13 @@ pub(super) fn planned() -> Result<Vec<Less>> {
     PARTS.into_iter().map(|(part, less, quantity)| Ok((part, less, row(quantity)?))).collect()
 }
 
-/// The command lines that they take.
+/// The command lines that the rows need.
 pub(super) fn lines(plan: &[Less]) -> BTreeSet<String> {
     let lines = plan.iter().flat_map(|(_, less, row)| row.lines().into_iter().map(move |line| (line, *less)));
     lines.flat_map(|(line, less)| [LAWS[0], less, LAWS[1]].map(|more| format!("{line} {more}"))).collect()
 }
 
-/// The rows, by what came of the lines.
+/// The rows, made from the outcomes of the lines.
 pub(super) fn found(plan: &[Less], driven: &BTreeMap<String, Outcome>, machine: &Machine) -> Vec<PartRow> {
     let row = |(part, less, row): &Less| {
         let found = [LAWS[0], *less, LAWS[1]].map(|more| read(row, more, driven, machine));
@@ -101,7 +101,7 @@ pub(super) fn found(plan: &[Less], driven: &BTreeMap<String, Outcome>, machine: 
     plan.iter().map(row).collect()
 }
 
-/// A row's cell under a law, or without a part of ours, by the words that the runs had besides.
+/// A row's cell for a law, or without a part of ours, given the further words of the runs.
 fn read(row: &Plan, more: &str, driven: &BTreeMap<String, Outcome>, machine: &Machine) -> String {
     let outcomes = Outcomes { law: 0, more, driven, machine };
     row.read(&outcomes).unwrap_or_else(trips).text

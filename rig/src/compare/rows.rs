@@ -1,4 +1,4 @@
-//! The rows of the PMaSynRM drive: which runs, which numbers of them, and how they are printed.
+//! The rows of the PMaSynRM drive: their runs, the numbers taken from these, and the way they are printed.
 
 use super::outcome::{Cell, Outcomes, Row, cell, field, trips, verdict};
 use crate::analysis::Figures;
@@ -9,15 +9,15 @@ use crate::verdict::worst;
 pub struct Plan {
     pub quantity: &'static str,
     read: Read,
-    /// The paper's word on it.
+    /// The paper's statement on it.
     paper: &'static str,
-    /// The reason why ours is not ahead, where it is not.
+    /// The reason if ours is not ahead.
     why: &'static str,
 }
 
 /// The way to a row's numbers.
 enum Read {
-    /// The runs by their words, and a law's numbers of them; the fault that tripped it where it has none.
+    /// The runs by their words, and a law's numbers from them; if it has none, the fault that tripped it.
     Runs(fn() -> Vec<String>, fn(&Outcomes) -> Result<Cell, &'static str>),
     /// Figures of one run by their names, each with its decimals and its unit.
     Figures(&'static str, &'static [Figure]),
@@ -27,7 +27,7 @@ enum Read {
 pub(super) type Figure = (&'static str, usize, &'static str);
 
 impl Plan {
-    /// A row on which the paper says nothing, and in which ours is ahead, of these runs.
+    /// A row of these runs on which the paper says nothing and in which ours is ahead.
     pub const fn of(
         quantity: &'static str,
         lines: fn() -> Vec<String>,
@@ -36,12 +36,12 @@ impl Plan {
         Self { quantity, read: Read::Runs(lines, read), paper: "", why: "" }
     }
 
-    /// The same of figures of one run.
+    /// The same for figures of one run.
     pub const fn figures(quantity: &'static str, line: &'static str, wanted: &'static [Figure]) -> Self {
         Self { quantity, read: Read::Figures(line, wanted), paper: "", why: "" }
     }
 
-    /// The same with the paper's word.
+    /// The same with the paper's statement.
     pub const fn paper(self, paper: &'static str) -> Self {
         Self { paper, ..self }
     }
@@ -59,7 +59,7 @@ impl Plan {
         }
     }
 
-    /// A law's numbers; the fault that tripped it where it has none.
+    /// A law's numbers; if it has none, the fault that tripped it.
     pub fn read(&self, law: &Outcomes) -> Result<Cell, &'static str> {
         match self.read {
             Read::Runs(_, read) => read(law),
@@ -77,7 +77,7 @@ impl Plan {
     }
 }
 
-/// So many decimals.
+/// A number with a given number of decimals.
 pub(super) fn decimals(value: f64, count: usize) -> String {
     format!("{value:.count$}")
 }
@@ -237,7 +237,7 @@ pub const ROWS: [Plan; 12] = [
     ),
 ];
 
-/// Of the methods the one that the law runs; the ordinary one also started from no current.
+/// The method that the law runs; for the ordinary law also its method started from no current.
 fn mtpa(law: &Outcomes) -> Result<Cell, &'static str> {
     let figures = mtpa_methods::compare(law.machine);
     let of = |method: &str| {

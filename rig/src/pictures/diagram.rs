@@ -39,7 +39,7 @@ impl Diagram {
         self
     }
 
-    /// A part of the whole with its name at the upper left, behind what comes after.
+    /// A part of the whole with its name at the upper left, drawn behind what is added later.
     pub fn part(&mut self, frame: Frame, name: &str, colour: Colour) -> &mut Self {
         self.panel.shade((frame.0, frame.1), (frame.0 + frame.2, frame.1 + frame.3), colour, 0.07);
         self.outline(frame, colour, 1.0);

@@ -10,14 +10,14 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Units of the drawing in a pixel: coordinates are whole numbers, and a curve of whole pixels would be stepped.
 pub const FINE: u32 = 4;
-/// The cover of a stroke that stands for dashes: plotters' SVG has none.
+/// Opacity of a stroke that stands for dashes, which plotters' SVG does not have.
 pub const DASHED: f64 = 0.99;
 
 /// The sheet.
 type Sheet<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// A place on the sheet, in its units.
 type Place = (i32, i32);
-/// Room left of a panel with axes for its numbers, and below it; above it for its title, and to its right; in px.
+/// Room around a panel with axes, in px: left of it and below it for its numbers, above it for its title, and to its right.
 const ROOM: (f64, f64, f64, f64) = (72.0, 50.0, 26.0, 16.0);
 /// Free edge left of a panel's words and below them, in px.
 const EDGE: f64 = 8.0;
@@ -29,7 +29,7 @@ fn fine(px: f64) -> i32 {
     (px * f64::from(FINE)).round() as i32
 }
 
-/// The font size that makes letters so many px high: plotters takes a size to be 1.24 times that of its SVG.
+/// The font size that makes letters a number of px high: plotters takes a size to be 1.24 times that of its SVG.
 fn letters(px: f64) -> i32 {
     fine(1.24 * px)
 }
@@ -64,7 +64,7 @@ fn subscripts(svg: &str) -> String {
             let (low, rest) = part.split_once('}').unwrap_or((part, ""));
             out += &format!("<tspan dy=\".3em\" font-size=\"75%\">{low}{END}");
             let (line, end) = rest.split_at(rest.trim_end().len());
-            // A renderer may drop a space at the beginning of a part: it is a shift instead.
+            // A renderer may drop a space at the beginning of a part, so a shift replaces it.
             let shift = if line.starts_with(' ') { " dx=\".28em\"" } else { "" };
             out += &format!("<tspan{shift} dy=\"-.225em\">{}{END}{end}", line.trim_start());
         }
@@ -118,7 +118,7 @@ fn draw_panel(sheet: &Sheet, panel: &Panel) -> Result<()> {
     headings(sheet, panel, above)
 }
 
-/// An axis whose numbers have a distance of their own, if it says one.
+/// An axis whose numbers have a spacing of their own, if one is set.
 struct Numbered {
     whole: RangedCoordf64,
     each: Option<f64>,
@@ -198,19 +198,19 @@ fn ranges(panel: &Panel, (width, height): (f64, f64)) -> (Point, Point) {
     (x, y)
 }
 
-/// A range with a share of it as room at both ends; never none.
+/// A range with a share of it as room at both ends; never empty.
 fn with_room((low, high): Point, share: f64) -> Point {
     if low > high {
         return (0.0, 1.0);
     }
     let least = 1e-6 * low.abs().max(high.abs()).max(1e-6);
-    // Of a level curve so much that the numbers of its axis differ.
+    // A level curve gets enough room for its axis' numbers to differ.
     let level = 0.1 * low.abs().max(high.abs()).max(1e-5);
     let room = (share * (high - low)).max(if high - low < least { level } else { 0.0 });
     (low - room, high + room)
 }
 
-/// A mark as far as it lies within the axes; a curve that leaves them ends where it does.
+/// The part of a mark within the axes; a curve that leaves them ends there.
 fn within(mark: &Mark, (x0, x1): Point, (y0, y1): Point) -> Vec<Mark> {
     let Mark::Line(points, colour, width, dashes) = mark else { return vec![mark.clone()] };
     let slack = (1e-9 * (x1 - x0), 1e-9 * (y1 - y0));
@@ -269,8 +269,8 @@ fn draw_arrow(sheet: &Sheet, points: &[Point], colour: Colour, place: &dyn Fn(Po
     Ok(())
 }
 
-/// A path without the points that nobody sees: of those in a column of the sheet the first, the extremes and the last; of those on a
-/// straight line its ends.
+/// A path without the points that nobody sees: each column of the sheet keeps its first, extreme and last points, each straight line
+/// its ends.
 fn thinned(path: impl Iterator<Item = Place>) -> Vec<Place> {
     let column = |x: i32| x.div_euclid(FINE as i32);
     let mut kept: Vec<Place> = Vec::new();
@@ -287,7 +287,7 @@ fn thinned(path: impl Iterator<Item = Place>) -> Vec<Place> {
     bends(&kept)
 }
 
-/// The points of a path that lie off the straight line between those kept before and after by more than a unit of the sheet.
+/// The points of a path that lie more than a unit of the sheet off the straight line between those kept before and after.
 fn bends(path: &[Place]) -> Vec<Place> {
     let Some(last) = path.len().checked_sub(1) else { return Vec::new() };
     let mut kept = vec![false; path.len()];

@@ -1,4 +1,4 @@
-//! Currents in the rotor's plane: ellipses of a voltage, hyperbolas of a torque, and where the drive goes between them. Of any machine.
+//! Currents in the rotor's plane of any machine: ellipses of a voltage, hyperbolas of a torque, and the drive's path between them.
 
 use super::sheet::Point;
 use crate::machine::Machine;
@@ -12,12 +12,12 @@ pub struct Loci<'a> {
     map: SmoothMap,
     /// Largest fundamental, peak phase, in V.
     voltage_v: f64,
-    /// The two-level link whose square wave has it, in V.
+    /// The two-level link whose square wave has that fundamental, in V.
     udc_v: f64,
 }
 
 impl<'a> Loci<'a> {
-    /// Of a machine behind a link whose square wave is its voltage limit.
+    /// The plane of a machine behind a link whose square wave is its voltage limit.
     pub fn new(machine: &'a Machine, udc_v: f64) -> Self {
         let voltage_v = udc_v * core::f64::consts::FRAC_2_PI;
         Self { machine, map: SmoothMap::new(&machine.folder.map), voltage_v, udc_v }
@@ -47,7 +47,7 @@ impl<'a> Loci<'a> {
         self.map.inverse(0.0, 0.0, (-0.5 * self.largest_a(), 0.0))
     }
 
-    /// The ellipse on which the voltage is the largest at a speed, the resistance left out, as far as the map is known.
+    /// The ellipse of the largest voltage at a speed, neglecting the resistance, as far as the map is known.
     pub fn ellipse(&self, rpm: f64) -> Vec<Point> {
         let flux_wb = self.voltage_v / self.omega(rpm);
         let start = self.centre().unwrap_or((-0.5 * self.largest_a(), 0.0));
@@ -99,7 +99,7 @@ impl<'a> Loci<'a> {
         optimum.least_current(optimum.most_torque_nm())
     }
 
-    /// The drive's current for a torque at a speed, in square wave at most; the last column is the torque that it gives, in N·m.
+    /// The drive's current for a torque at a speed, up to square wave; the last column is the torque that it gives, in N·m.
     fn drives(&self, torque_nm: f64, rpm: f64) -> (Point, f64) {
         let limit = VoltageLimit { udc_v: self.udc_v as f32, modulation_index: 1.0, filled: false };
         let point = operating_point(torque_nm as f32, self.omega(rpm) as f32, &limit, self.machine.tables);

@@ -17,8 +17,8 @@ const COUNTED: u32 = 499;
 
 /// Top of the axis of distortion, in %.
 const HIGHEST: f64 = 12.0;
-/// Place of a pattern's name: share of its curve, distance above it in %, and side. The curves fall: right above one and left below it there is
-/// nothing of itself.
+/// Place of a pattern's name: share of its curve, distance above it in %, and side. The curves fall: a curve leaves the areas above to its
+/// right and below to its left free.
 fn name_place(name: &str) -> (f64, f64, Side) {
     match name {
         "opp5c" => (0.0, 0.0, Side::Left),
@@ -37,14 +37,14 @@ struct Played {
 }
 
 impl Played {
-    /// As the modulator plays it, at nine tenths of the highest frequency that it is for.
+    /// The pattern as the modulator plays it, at nine tenths of the highest frequency that it is for.
     fn of(machine: &Machine, branch: Branch, index: f64) -> Result<Self> {
         let mode = Mode::named(branch.name).with_context(|| format!("no mode {}", branch.name))?;
         let f1_hz = 0.9 * branch.highest_hz;
         Ok(Self { branch, index, f1_hz, edges: pulses(machine, mode, f1_hz, index)? })
     }
 
-    /// In the middle of its window, or where the best of many starts was looked for.
+    /// The pattern in the middle of its window, or at the index for which the best of many starts was sought.
     fn usual(machine: &Machine, branch: Branch) -> Result<Self> {
         Self::of(machine, branch, f64::from(branch.anchor) / 100.0)
     }
@@ -62,7 +62,7 @@ impl Played {
 /// Harmonic of the first leg's level over one turn, in units of its own.
 fn harmonic(edges: &[LegEdge], f1_hz: f64, order: u32) -> f64 {
     let turn = TAU * f64::from(order) * f1_hz;
-    // The first entry of a leg is its level, no change.
+    // The first entry of a leg is its level, not a change.
     let changes = edges.iter().filter(|(t_s, leg, _)| *leg == 0 && *t_s > 0.0);
     let (re, im) = changes.fold((0.0, 0.0), |(re, im), (t_s, _, on)| {
         let (sin, cos) = (turn * t_s).sin_cos();
@@ -109,7 +109,7 @@ pub fn every_spectrum(machine: &Machine) -> Result<String> {
         let played = Played::usual(machine, branch)?;
         let axes = (Axis::of("harmonic", 0.0, f64::from(SHOWN + 1)), Axis::of("% of V_{1}", 0.0, 110.0));
         let mut panel = Panel::new(place(k, HEIGHT), &played.title(), axes.0, axes.1);
-        // Of a machine without a neutral: odd, and no multiple of three.
+        // For a machine without a neutral: odd, and no multiple of three.
         for order in (1..=SHOWN).step_by(2).filter(|order| order % 3 != 0) {
             let (x, height) = (f64::from(order), 100.0 * played.harmonic(order));
             panel.shade((x - 0.4, 0.0), (x + 0.4, height), if order == 1 { GREY } else { BLUE }, 1.0);
@@ -142,7 +142,7 @@ pub fn every_distortion(machine: &Machine) -> Result<String> {
         let mut points = Vec::new();
         for hundredths in (30..=98).step_by(2) {
             let share = f64::from(hundredths) / 100.0;
-            // A carrier's amplitude ends below six-step: there the mode is not asked.
+            // A carrier's amplitude ends below six-step: beyond it the mode is not asked for.
             let Ok(edges) = pulses(machine, mode, f1_hz, share) else { break };
             points.push((share, distortion(&edges, f1_hz)));
         }

@@ -1,6 +1,6 @@
 //! The sheet that a picture is drawn on: panels with axes, and the marks in them.
 //!
-//! A panel is data until it is drawn, so that what is in a picture and what it looks like stay apart.
+//! A panel is data until it is drawn, which separates the contents of a picture from its looks.
 
 use plotters::style::RGBColor;
 
@@ -58,11 +58,11 @@ pub enum Mark {
 pub struct Axis {
     /// The quantity with its unit.
     pub label: String,
-    /// First and last value; where there is none, those of the curves and some room.
+    /// First and last value; if there are none, those of the curves and some room.
     pub range: Option<(f64, f64)>,
     /// `true` if the axis has no numbers.
     pub bare: bool,
-    /// Distance of its numbers; where there is none, a round one.
+    /// Spacing of its numbers; if there is none, a round one.
     pub each: Option<f64>,
 }
 
@@ -95,7 +95,7 @@ pub struct Panel {
     pub place: (f64, f64, f64, f64),
     /// The words above it.
     pub title: String,
-    /// The axis to the right, and the one upwards; a drawing without them has px, from its upper left corner.
+    /// The axis to the right, and the one upwards; a drawing without them is in px from its upper left corner.
     pub axes: Option<(Axis, Axis)>,
     /// `true` if both axes have the same scale, as a plane of vectors needs it.
     pub even: bool,
@@ -140,7 +140,7 @@ impl Panel {
         self.line(points, colour, 1.6)
     }
 
-    /// Adds a dashed curve whose name stands above the panel: one that may lie on the one before. It is the last of them.
+    /// Adds a dashed curve, which may lie on the one before; its name stands above the panel. It is the last one named.
     pub fn named_dashes(
         &mut self,
         name: &str,

@@ -9,7 +9,7 @@ const POINTS: usize = 1500;
 /// Colours of the curves, in their order.
 pub const COLOURS: [RGBColor; 2] = [RGBColor(31, 119, 180), RGBColor(214, 39, 40)];
 
-/// No more than about [`POINTS`] points: of each stretch the lowest and the highest, in their order.
+/// No more than about [`POINTS`] points: the lowest and the highest of each stretch, in their order.
 pub fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() <= POINTS {
         return points.to_vec();

@@ -1,7 +1,7 @@
 //! The numbers behind a page's plots, packed: whole multiples of a step, as differences, deflated, in base 64.
 //!
 //! A column's values are rounded to multiples of a step of 1, 2 or 5 times a power of ten. The differences of first or second order, whichever
-//! take less room, are zigzag numbers of seven bits a byte, the lowest first. All columns together are one deflated stream.
+//! take less room, are stored as zigzag numbers of seven bits a byte, the lowest first. All columns together are one deflated stream.
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -9,11 +9,11 @@ use serde::Serialize;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// Parts of its span to which a curve is rounded, at least.
+/// Parts into which rounding divides a curve's span, at least.
 const PARTS: f64 = 8192.0;
-/// The same of times that are not evenly spaced.
+/// The same for times that are not evenly spaced.
 const TIME_PARTS: f64 = 67_108_864.0;
-/// Rows of a table at most; of more, each stretch keeps its lowest and its highest value.
+/// Largest number of rows in a table; if there are more, each stretch keeps its lowest and its highest value.
 pub const MOST_ROWS: usize = 300_000;
 
 /// Times of a table's rows.
@@ -22,9 +22,9 @@ pub const MOST_ROWS: usize = 300_000;
 enum Times {
     /// Evenly spaced.
     Even {
-        /// That of the first row.
+        /// Time of the first row.
         first: f64,
-        /// From one to the next.
+        /// Time from one row to the next.
         every: f64,
     },
     /// A column of their own.
@@ -54,7 +54,7 @@ struct Table {
     #[serde(flatten)]
     times: Times,
     columns: Vec<Column>,
-    /// Rows of the recording of which a stretch keeps its lowest and its highest; 1: each is here.
+    /// Rows of the recording in a stretch, which keeps their lowest and their highest; 1: every row is here.
     stretch: usize,
 }
 
@@ -66,7 +66,7 @@ pub type Place = (usize, usize);
 pub struct Data {
     tables: Vec<Table>,
     bytes: Vec<u8>,
-    /// The places of values that are here already, by their table and their hash: a page shows the same curve around every change of mode.
+    /// Places of the values that are already stored, by table and hash: a page shows the same curve around every change of mode.
     known: HashMap<(usize, u64), Place>,
 }
 
@@ -113,7 +113,7 @@ impl Data {
         place
     }
 
-    /// Instants in whole ticks of a length in s, with a level that is a small whole number from each on.
+    /// Instants in whole ticks of a length in s, each with the level from there on, a small whole number.
     pub fn edges(&mut self, ticks: &[i64], tick_s: f64, levels: &[i64]) -> Place {
         let at = self.pack(ticks, tick_s);
         self.tables.push(Table {
@@ -170,7 +170,7 @@ impl Data {
         BASE64_STANDARD.encode(miniz_oxide::deflate::compress_to_vec(&self.bytes, 7))
     }
 
-    /// The resolution of the stored rows in words; over time, with their distance.
+    /// The resolution of the stored rows in words; for plots over time, with their spacing.
     pub fn resolution(&self, over_time: bool) -> String {
         let longest = self.tables.iter().max_by_key(|table| table.rows * table.columns.len());
         let Some(table) = longest.filter(|table| !table.columns.is_empty()) else { return String::new() };
@@ -189,7 +189,7 @@ impl Data {
     }
 }
 
-/// First and distance of times that are evenly spaced, as printed times are: to a nanosecond.
+/// First value and spacing of times that are evenly spaced to a nanosecond, as printed times are.
 fn evenly(times: &[f64]) -> Option<(f64, f64)> {
     let (first, last) = (*times.first()?, *times.last()?);
     let every = (last - first) / (times.len().max(2) - 1) as f64;
@@ -204,7 +204,7 @@ fn stretched_times(times: &[f64], stretch: usize) -> Vec<f64> {
     times.chunks(stretch).flat_map(|part| [part[0], part[part.len() / 2]]).collect()
 }
 
-/// Of each stretch the lowest and the highest value, in their order; nothing where every row is kept.
+/// The lowest and the highest value of each stretch, in their order; none if every row is kept.
 fn stretched(values: &[f64], stretch: usize) -> Option<Vec<f64>> {
     let ends = |part: &[f64]| {
         let by_value = |a: &usize, b: &usize| part[*a].total_cmp(&part[*b]);
@@ -215,12 +215,12 @@ fn stretched(values: &[f64], stretch: usize) -> Option<Vec<f64>> {
     (stretch > 1).then(|| values.chunks(stretch).flat_map(ends).collect())
 }
 
-/// A step of 1, 2 or 5 times a power of ten, of which the values' span has at least so many.
+/// A step of 1, 2 or 5 times a power of ten that divides the values' span into at least a given number of parts.
 fn step(values: &[f64], parts: f64) -> f64 {
     let (low, high) = values
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
-    // A value that is constant but for rounding has no span.
+    // A value that is constant except for rounding has no span.
     let least = high.abs().max(low.abs()) / (4096.0 * parts);
     let wanted = ((high - low) / parts).max(least);
     if !wanted.is_finite() || wanted <= 0.0 {
@@ -231,7 +231,7 @@ fn step(values: &[f64], parts: f64) -> f64 {
     factor * power
 }
 
-/// Differences of an order; before the first number stand zeros.
+/// Differences of an order, with zeros before the first number.
 fn differences(numbers: &[i64], order: u8) -> Vec<i64> {
     let mut numbers = numbers.to_vec();
     for _ in 0..order {

@@ -1,4 +1,4 @@
-//! The page's text: what it says first, what was run, a place for each plot, tables; and the numbers and the script that fill the places.
+//! The page's text: its headline, what was run, a place for each plot, tables; and the numbers and the script that fill the places.
 
 use super::data::Data;
 use super::scope::{Band, Mark, Scope};
@@ -26,7 +26,7 @@ pub enum Block {
 pub struct Document {
     /// Name of what was run.
     pub title: String,
-    /// The words behind it.
+    /// The words after it.
     pub about: String,
     /// The words that stand first, if there are any.
     pub headline: Option<String>,
@@ -87,7 +87,7 @@ pub fn page(page: &Document, subtitle: &str, figures: &Figures) -> Result<String
         "marks": serde_json::to_value(&page.marks)?,
         "bands": serde_json::to_value(&page.bands)?,
     });
-    // Nothing in the numbers may end the element that they stand in.
+    // The numbers must not end the element that they stand in.
     let model = model.to_string().replace('<', "\\u003c");
     Ok(format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
@@ -109,7 +109,7 @@ impl Block {
     }
 }
 
-/// The places of the plots, in their order; those over a part of a run, and those over axes of their own, side by side where there is room.
+/// The places of the plots, in their order; those over a part of a run, and those over their own axes, side by side if there is room.
 fn plots(body: &mut String, blocks: &[Block]) {
     let mut number = 0;
     for block in blocks {

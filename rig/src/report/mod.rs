@@ -30,16 +30,16 @@ pub type Curve<'a, R = Row> = (&'a str, fn(&R) -> f64);
 /// The words of a scenario that answers none of the paper's figures.
 pub const NO_FIGURE: &str = "no figure";
 
-/// The axis of what goes on in a run.
+/// The axis of plots over a run's time.
 const TIME: &str = "time in s";
 
-/// Points of a curve: where on the axis, and the value there.
+/// Points of a curve: the position on the axis, and the value there.
 type Points = Vec<(f64, f64)>;
 
 /// A page under construction.
 pub struct Page {
     document: Document,
-    /// The paper's figure that the plots answer from here on; nothing where it has none.
+    /// The paper's figure that the plots answer from here on; none if the paper has none.
     figure: Option<String>,
     /// `true` if none of the plots answers a figure of the paper.
     is_another_machine: bool,
@@ -132,7 +132,7 @@ impl Page {
             let mut series = Vec::new();
             for (index, (name, value)) in curves.iter().enumerate() {
                 let of = |(at_s, record): &(f64, R)| (1e3 * (at_s - t_s), f64::from(value(record)));
-                // What is not finite may be the fault itself, and cannot be drawn.
+                // A value that is not finite may be the fault itself, and cannot be drawn.
                 let points: Points = recorded.iter().map(of).filter(|(_, value)| value.is_finite()).collect();
                 series.push(Series::new(name, self.points(&points), index));
             }
@@ -144,7 +144,7 @@ impl Page {
         self.document.blocks.push(Block::Plots(scope));
     }
 
-    /// Curves over anything, beside a figure of the paper or none; `axes` are the labels of x and y.
+    /// Curves over any axis, beside a figure of the paper or none; `axes` are the labels of x and y.
     pub fn draw_xy<'a>(
         &mut self,
         figure: impl Into<Option<&'a str>>,
@@ -225,7 +225,7 @@ impl Page {
         let table = self.document.data.table(&times);
         let of = |(index, (name, value)): (usize, &Curve<R>)| {
             let mut last = 0.0;
-            // A value that is none cannot be drawn: the one before stands for it.
+            // A value that is not finite cannot be drawn: the one before replaces it.
             let finite = |value: f64| {
                 last = if value.is_finite() { value } else { last };
                 last

@@ -10,13 +10,13 @@ pub enum Over {
     Rows(usize, usize),
     /// A part of them, in s.
     Window(usize, f64, f64),
-    /// Points over a time that is told by somebody else, such as telemetry.
+    /// Points over a time that comes from elsewhere, such as telemetry.
     Telemetry,
     /// An axis of its own.
     Own,
 }
 
-/// The place of a curve among others, in which it is drawn over them.
+/// The kind of a curve, in the order in which curves are drawn over each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
@@ -24,7 +24,7 @@ pub enum Style {
     Ripple,
     /// A curve.
     Plain,
-    /// Dashed over what it is compared with: a reference, the other motor.
+    /// Dashed, over the curve that it is compared with: a reference, the other motor.
     Dashed,
     /// Edges of a level.
     Edges,
@@ -41,7 +41,7 @@ pub struct Series {
     pub ink: &'static str,
     /// The way that it is drawn.
     pub style: Style,
-    /// A column of the same page that a level is a multiple of.
+    /// A column of the same page by which a level is multiplied.
     pub scale: Option<Place>,
 }
 
@@ -60,7 +60,7 @@ pub struct Panel {
     pub label: String,
     /// The curves, the last one on top.
     pub series: Vec<Series>,
-    /// Names of the values 0, 1, 2, … where they are states.
+    /// Names of the values 0, 1, 2, … if they are states.
     pub levels: Vec<String>,
 }
 
@@ -78,13 +78,13 @@ pub struct Scope {
     /// Its heading.
     #[serde(skip)]
     pub heading: String,
-    /// The paper's figure that its panels answer unless they say another.
+    /// The paper's figure that its panels answer unless they name another.
     #[serde(skip)]
     pub figure: Option<String>,
     /// Its rows.
     #[serde(skip)]
     pub over: Over,
-    /// `true` where the axis is the run's time, with marks and the cursor that all share.
+    /// `true` if the axis is the run's time, with marks and the cursor that all share.
     pub time: bool,
     /// The axis' quantity and unit.
     pub x: String,
@@ -119,7 +119,7 @@ pub struct Band {
 /// Colours of curves that have none of their own, in their order.
 const INKS: [&str; 8] = ["w", "u", "v", "torque", "speed", "link", "flux", "muted"];
 
-/// Colour and style by what a curve is called.
+/// Colour and style by a curve's name.
 fn look(name: &str, index: usize) -> (&'static str, Style) {
     match name {
         "torque" => ("ripple", Style::Ripple),

@@ -6,7 +6,7 @@ use crate::verdict::{FALLS_SHORT, NOT_SEEN};
 use serde_json::{Map, Value};
 use std::fmt::Write as _;
 
-/// Verdicts, the worst first; nothing of none.
+/// Verdicts, the worst first; nothing without any.
 pub fn verdicts(figures: &Figures) -> String {
     let mut rows: Vec<_> = figures.get("verdicts").and_then(Value::as_array).into_iter().flatten().collect();
     if rows.is_empty() {
@@ -37,7 +37,7 @@ pub fn verdicts(figures: &Figures) -> String {
     text + "</tbody></table>"
 }
 
-/// The share of its bound that a figure takes; of a bound from below the inverse.
+/// The share of its bound that a figure uses; for a bound from below, the inverse.
 fn share(row: &Value) -> Option<f64> {
     let found = row["found"].as_f64()?;
     let share =
@@ -57,7 +57,7 @@ fn bar(share: f64) -> String {
     )
 }
 
-/// Order of a verdict: what falls short, what was not seen, what is closest to its bound, what is only reported.
+/// Order of a verdict: first those that fall short, then those not seen, then those closest to their bound, last those only reported.
 fn severity(row: &Value) -> f64 {
     match row["verdict"].as_str() {
         Some(FALLS_SHORT) => 0.0,
@@ -129,7 +129,7 @@ fn number(value: &Value) -> &'static str {
     if value.is_number() { " class=\"n\"" } else { "" }
 }
 
-/// A figure as people read it: four digits that count, not seventeen.
+/// A figure as people read it: four significant digits, not seventeen.
 fn cell(value: &Value) -> String {
     match value {
         Value::Number(number) if number.is_f64() => digits(number.as_f64().unwrap_or(f64::NAN)),
@@ -140,7 +140,7 @@ fn cell(value: &Value) -> String {
     }
 }
 
-/// The same with its unit; nothing of nothing.
+/// The same with its unit; none without a value.
 fn with_unit(value: &Value, unit: &str) -> Option<String> {
     (!value.is_null()).then(|| if unit.is_empty() { cell(value) } else { format!("{} {unit}", cell(value)) })
 }

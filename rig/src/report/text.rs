@@ -33,7 +33,7 @@ const UNITS: [(&str, &str); 21] = [
     ("_k", "K"),
 ];
 
-/// Unit of a fault's value and limit; nothing of those that count something.
+/// Unit of a fault's value and limit; none for those that count something.
 pub const fn unit(fault: Fault) -> &'static str {
     match fault {
         Fault::Overcurrent | Fault::PhaseSum | Fault::CurrentOffset => "A",
@@ -51,14 +51,14 @@ pub const fn unit(fault: Fault) -> &'static str {
 /// A fault with the value that broke its limit.
 pub fn broken(trip: Trip) -> String {
     let of = |value: f32| measured(&json!(f64::from(value)), unit(trip.fault));
-    // What is no number breaks any limit.
+    // A value that is no number breaks any limit.
     if !trip.value.is_finite() {
         return format!("{}: a value that is no number", trip.fault.name());
     }
     format!("{}: {}, limit {}", trip.fault.name(), of(trip.value), of(trip.limit))
 }
 
-/// Pass, or what was not kept.
+/// Pass, or the bounds that were not kept.
 pub fn headline(figures: &Figures, trip: Option<Trip>) -> String {
     if let Some(trip) = trip {
         return format!("FALLS SHORT: the drive tripped, {}", broken(trip));
@@ -73,7 +73,7 @@ pub fn headline(figures: &Figures, trip: Option<Trip>) -> String {
     }
 }
 
-/// All figures: verdicts first, then numbers, then lists, a table each.
+/// All figures: first verdicts, then numbers, then lists, each as a table.
 pub fn text(figures: &Figures) -> String {
     let mut parts = Vec::new();
     if let Some(Value::Array(verdicts)) = figures.get("verdicts") {
@@ -117,7 +117,7 @@ pub(super) fn split_unit(what: &str) -> (String, &'static str) {
 pub(super) fn quantity(name: &str) -> (String, &'static str) {
     let known = UNITS.iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, *unit)));
     let (words, unit) = known.unwrap_or((name, ""));
-    // Of the percent in a name its point is a letter: `back_within_0p2_percent`.
+    // In a name, the decimal point of a percentage is a letter: `back_within_0p2_percent`.
     (words.replace('_', " ").replace("0p2 percent", "0.2 %"), unit)
 }
 
@@ -140,7 +140,7 @@ pub fn list(heading: &str, rows: &[Value]) -> String {
     format!("{heading}\n{}", table(&heads, rows))
 }
 
-/// A value with its unit: numbers with four digits that count.
+/// A value with its unit; numbers have four significant digits.
 fn measured(value: &Value, unit: &str) -> String {
     let number = match value {
         Value::Number(number) if number.is_f64() => digits(number.as_f64().unwrap_or(f64::NAN)),
@@ -152,7 +152,7 @@ fn measured(value: &Value, unit: &str) -> String {
     if unit.is_empty() { number } else { format!("{number} {unit}") }
 }
 
-/// Four digits that count; of what is smaller than a thousandth three decimals of its power.
+/// Four significant digits; below a thousandth, three digits and a power of ten.
 pub(super) fn digits(value: f64) -> String {
     let size = value.abs();
     let before = if size < 1.0 { 0 } else { size.log10() as usize + 1 };
@@ -163,7 +163,7 @@ pub(super) fn digits(value: f64) -> String {
     }
 }
 
-/// Columns that line up; those that hold numbers to the right.
+/// Aligned columns; those that hold numbers are aligned to the right.
 fn table(heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     let rows: Vec<_> = rows.collect();
     let mut table = Table::new();
@@ -213,7 +213,7 @@ mod tests {
             let said = ["A", "V", "rad/s", "rad", "s", "control periods"].into_iter().find(|unit| {
                 value.split([',', ';', ' ']).any(|word| word == *unit) || value.contains(&format!(" {unit} "))
             });
-            // What counts in one case and takes a time in another has none.
+            // A value that is a count in one case and a time in another has none.
             let mixed = value.trim_start().starts_with('1');
             assert_eq!(unit(fault), said.filter(|_| !mixed).unwrap_or_default(), "{}: {value}", fault.name());
         }

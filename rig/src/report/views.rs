@@ -81,7 +81,7 @@ impl Page {
         self.part(heading, recording, window, ("torque", "N·m"), series);
     }
 
-    /// Current out of the line; nothing without a line filter.
+    /// Current out of the line; none without a line filter.
     pub fn line(&mut self, recording: &Recording) {
         if recording.rows.iter().any(|row| row.line_a.is_some()) {
             self.plot("DC link", "V", recording, &[("udc", |row| row.udc_v)]);
@@ -90,7 +90,7 @@ impl Page {
         }
     }
 
-    /// The flight recorder's records of a fault; nothing if there was none.
+    /// The flight recorder's records of a fault; none without a fault.
     pub fn recorder(&mut self, recording: &Recording) {
         let panels: [Panel<Record>; 3] = [
             (
@@ -108,7 +108,7 @@ impl Page {
         self.recorded(&recording.recorded, |record| record.state.fault, &panels);
     }
 
-    /// The modes of a run as bands, its changes of mode and its faults as marks.
+    /// The modes of a run as bands, with its changes of mode and its faults as marks.
     pub fn events(&mut self, recording: &Recording) {
         for switch in recording.switches.iter().filter(|switch| switch.t_s > 0.0) {
             self.mark(switch.t_s, &format!("{} → {}", switch.from.name(), switch.to.name()), false);
@@ -198,8 +198,8 @@ fn levels(recording: &Recording) -> (Vec<i64>, Vec<i64>) {
     (ticks, levels)
 }
 
-/// Torque averaged over a carrier around each row: where the carrier is locked over its part of a turn, of a pattern over the sixth of a
-/// turn in which its ripple repeats, else over the free carrier's period.
+/// Torque averaged over a carrier around each row: for a locked carrier over its part of a turn, for a pattern over the sixth of a turn in
+/// which its ripple repeats, otherwise over the free carrier's period.
 fn carrier_means(rows: &[Row], carrier_hz: f64) -> Vec<f64> {
     let step_s = match rows {
         [first, second, ..] => second.t_s - first.t_s,

@@ -1,4 +1,4 @@
-//! The list of the interrupts, in the order in which they ended: a line `interrupt,mode,direction,frequency` each.
+//! The list of the interrupts, in the order in which they ended, with a line `interrupt,mode,direction,frequency` for each.
 
 use anyhow::{Context, Result};
 use std::fmt::Write as _;
@@ -26,7 +26,7 @@ impl Calls {
         self.line("control", &(report.omega / std::f32::consts::TAU).to_string());
     }
 
-    /// A control interrupt whose mode says everything.
+    /// A control interrupt that is fully described by its mode.
     pub(crate) fn control(&mut self) {
         self.line("control", "");
     }
@@ -42,7 +42,7 @@ impl Calls {
         let _ = writeln!(self.lines, "{interrupt},{},{direction},{frequency_hz}", self.mode);
     }
 
-    /// Writes them, if somebody wants them.
+    /// Writes the lines if a path is given.
     pub(crate) fn write(&self, path: Option<&Path>) -> Result<()> {
         match path {
             Some(path) => std::fs::write(path, &self.lines).with_context(|| path.display().to_string()),
@@ -51,8 +51,8 @@ impl Calls {
     }
 }
 
-/// By the sign of the mechanical power, torque by speed. Where that is nothing (no torque, standstill, a fault) it is the direction
-/// before, at first motoring.
+/// Direction by the sign of the mechanical power, torque times speed. If there is no power (no torque, standstill, a fault), the direction
+/// before is kept; at first it is motoring.
 fn direction(report: &Report, before: &'static str) -> &'static str {
     let power = report.torque_nm * report.omega;
     match before {

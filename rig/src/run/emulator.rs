@@ -22,13 +22,13 @@ pub struct Emulator {
     pub arguments: Vec<String>,
     /// The file of the interrupts, a line each.
     pub calls: Option<PathBuf>,
-    /// `true` if the run may stand still for as long as somebody types.
+    /// `true` if the run may stand still for as long as somebody needs to type.
     pub patient: bool,
 }
 
-/// Two to this many nanoseconds of virtual time per instruction: 8 ns, 125 MIPS, nearest to the real part.
+/// Power of two that gives the nanoseconds of virtual time per instruction: 8 ns, 125 MIPS, nearest to the real part.
 const NANOSECONDS_SHIFT: u32 = 3;
-/// The emulator is given up when it has not asked for anything for this long.
+/// Time without any request after which the emulator is given up.
 const SILENCE: Duration = Duration::from_secs(30);
 /// A request that no firmware sends: the emulator has ended.
 const ENDED: u32 = u32::MAX;
@@ -82,7 +82,7 @@ impl Answers {
     }
 }
 
-/// The four FIFOs. Both ends of each are held open, so that nobody waits for the other to open its end.
+/// The four FIFOs. Both ends of each are held open, so that neither side waits for the other to open its end.
 struct Link {
     requests: File,
     answers: Answers,

@@ -14,10 +14,10 @@ pub trait Interrupts {
     fn next_calls(&self) -> [Instant; 2];
     /// The PWM interrupt.
     fn pwm(&mut self, bench: &mut Self::Bench) -> Result<()>;
-    /// The control interrupt, and the idle loop where it ends.
+    /// The control interrupt, and the idle loop after its end.
     fn control(&mut self, bench: &mut Self::Bench) -> Result<()>;
 
-    /// The instant of the next interrupt, and whether it is the PWM's: at equal instants that comes first, because it has the higher priority.
+    /// The instant of the next interrupt, and `true` if it is the PWM's: at equal instants the PWM's comes first, with its higher priority.
     fn next(&self, bench: &Self::Bench) -> (Instant, bool) {
         let [control_at, pwm_at] = self.next_calls();
         let is_pwm = control_at.reached(pwm_at) || !bench.has_control(control_at);
@@ -35,7 +35,7 @@ pub trait Interrupts {
         if is_pwm { self.pwm(bench) } else { self.control(bench) }
     }
 
-    /// Until the bench's recording is complete, or nobody wants to see more of it.
+    /// Runs until the bench's recording is complete, or nobody wants to see more of it.
     fn drive(
         &mut self,
         bench: &mut Self::Bench,

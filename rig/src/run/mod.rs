@@ -30,13 +30,13 @@ pub const fn clock(control_hz: u32) -> Clock {
     Clock::new(TICKS_HZ, TICKS_HZ / control_hz)
 }
 
-/// The clock with the usual rate of control for devices that switch so often, in Hz.
+/// The clock with the usual rate of control for devices with a switching frequency in Hz.
 ///
 /// # Errors
-/// Devices that switch more often than that.
+/// Devices that switch faster than that.
 pub fn usual_clock(max_switching_hz: f32) -> anyhow::Result<Clock> {
     let control_hz = Clock::control_hz(max_switching_hz);
-    // A carrier lasts a control period at least.
+    // A carrier lasts at least a control period.
     anyhow::ensure!(
         max_switching_hz <= control_hz as f32,
         "max_switching_hz {max_switching_hz}: must be at most {control_hz}, the rate of control of this command; run and identify take --control-hz {:.0}",
@@ -67,13 +67,13 @@ pub(crate) fn refused(refused: Refused) -> anyhow::Error {
 
 /// The sender of commands over the protocol.
 pub trait Supervisor {
-    /// The slot that began at `t_s`: what is sent to the drive, and what happens to it. An error ends the run.
+    /// Serves the slot that began at `t_s`: says what is sent to the drive, and what happens to it. An error ends the run.
     fn slot(&mut self, t_s: f64) -> anyhow::Result<Turn>;
 
     /// A frame that the drive sends at `t_s`.
     fn hear(&mut self, t_s: f64, frame: &Frame);
 
-    /// `true` if a turn may take as long as somebody types.
+    /// `true` if a turn may take as long as somebody needs to type.
     fn is_typed(&self) -> bool {
         false
     }
@@ -82,16 +82,16 @@ pub trait Supervisor {
 /// A supervisor's turn.
 #[derive(Clone, Copy, Debug)]
 pub struct Turn {
-    /// For the drive.
+    /// The frame for the drive.
     pub frame: Option<Frame>,
-    /// The rotors' loads from the next slot on, in N·m; of one rotor the first.
+    /// The rotors' loads from the next slot on, in N·m; with one rotor the first.
     pub loads_nm: [f64; 2],
     /// `true` if the run ends with this slot.
     pub done: bool,
 }
 
-/// A supervisor's turn in the slot that began at `at`. What it does to the bench, it does at the next slot's beginning, whenever the slot
-/// is served.
+/// A supervisor's turn in the slot that began at `at`. Its actions on the bench take effect at the beginning of the next slot, whenever the
+/// slot is served.
 pub(crate) fn turn(
     supervisor: &mut dyn Supervisor,
     bench: &mut impl Simulated,
@@ -106,16 +106,16 @@ pub(crate) fn turn(
     Ok(turn.frame)
 }
 
-/// The bars on the terminal, a line each: runs go on side by side.
+/// The bars on the terminal, a line each, because runs go on side by side.
 static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 
-/// A bar of so many steps on a terminal; in a pipe indicatif draws none.
+/// A bar with a number of steps on a terminal; in a pipe indicatif draws none.
 pub(crate) fn bar(steps: u64, template: &str) -> ProgressBar {
     let bar = BARS.add(ProgressBar::new(steps));
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
-    // It stands there before the first step is done.
+    // The bar appears before the first step is done.
     bar.tick();
     bar
 }

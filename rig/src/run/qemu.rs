@@ -13,7 +13,7 @@ use tractive::wire::Block;
 pub(crate) struct Served<'s, B: Simulated> {
     pub(crate) bench: B,
     pub(crate) calls: Calls,
-    /// The records that the flight recorder has told.
+    /// The records that the flight recorder has sent.
     pub(crate) records: Vec<B::Record>,
     supervisor: Option<&'s mut dyn Supervisor>,
 }
@@ -35,8 +35,8 @@ impl<B: Simulated> Served<'_, B> {
     }
 }
 
-/// Runs until `answer` says of a block that the scenario is done; a supervisor commands over the protocol. `mode` is what the first
-/// interrupts are about.
+/// Runs until `answer` says for a block that the scenario is done; a supervisor gives commands over the protocol. `mode` is that of the
+/// first interrupts.
 pub(crate) fn in_qemu<B: Simulated>(
     (name, mode): (&str, &str),
     bench: B,

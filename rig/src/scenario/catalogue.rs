@@ -1,7 +1,7 @@
 //! Every scenario by name, and the command line of each.
 //!
-//! A command line is read twice: at first by one that knows the options of all scenarios, only to find the scenario's name
-//! among their values; then by the scenario's own, which knows nothing else.
+//! A command line is read twice: first by a parser that knows the options of all scenarios, only to find the scenario's name
+//! among their values; then by the scenario's own parser, which knows nothing else.
 
 use super::traction::{
     Traction, acknowledge::Acknowledge, borders_timing::BordersTiming, characteristic::Characteristic,
@@ -19,7 +19,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::ffi::OsString;
 
-/// The scenario that is meant where none is named.
+/// The scenario that runs if none is named.
 pub const DEFAULT: &str = "sweep";
 
 /// A scenario of either system that was chosen.
@@ -33,7 +33,7 @@ pub enum Chosen {
 /// A scenario's own part of the command line, read.
 type Own<S> = (Box<dyn Scenario<S>>, Map<String, Value>);
 
-/// A scenario: its name, the paper's figure that it answers or that there is none, and its options.
+/// A scenario: its name, the paper's figure that it answers or a note that there is none, and its options.
 pub struct Entry<S: System> {
     name: &'static str,
     figure: &'static str,
@@ -127,13 +127,13 @@ const ZS9: [Entry<Zs9>; 5] = [
     ),
 ];
 
-/// The names of all, and what they are.
+/// The names of all scenarios, and what they are.
 pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
     let traction = TRACTION.iter().map(|entry| (entry.name, entry.figure));
     traction.chain(ZS9.iter().map(|entry| (entry.name, entry.figure)))
 }
 
-/// Those that are not short on purpose, for what counts instructions.
+/// All scenarios except those kept short on purpose for counting instructions.
 pub fn listed() -> impl Iterator<Item = (&'static str, &'static str)> {
     names().filter(|(name, _)| !name.ends_with("timing"))
 }
@@ -148,7 +148,7 @@ fn scenario_argument() -> Arg {
     Arg::new("scenario").value_name("SCENARIO").default_value(DEFAULT).help("What to run")
 }
 
-/// The name among the words, or the default; `None` where there is no name and help is asked for.
+/// The name among the words, or the default; `None` if there is no name and help is asked for.
 fn name(words: &[OsString]) -> Option<String> {
     let help = Arg::new("help").long("help").short('h').action(ArgAction::SetTrue);
     let all = TRACTION.iter().map(Entry::command).chain(ZS9.iter().map(Entry::command));
@@ -167,7 +167,7 @@ fn name(words: &[OsString]) -> Option<String> {
     if is_help && !named {
         return None;
     }
-    // What follows a value that is none is not read: the scenario's own command line says what is wrong.
+    // Words after an invalid value are not read: the scenario's own command line reports the error.
     Some(matches.get_one::<String>("scenario").map_or(DEFAULT, String::as_str).to_owned())
 }
 
@@ -182,12 +182,12 @@ fn help() -> clap::Error {
     asked.expect_err("help is no match")
 }
 
-/// Name of this program in its usage; who calls it for others says so.
+/// Name of this program in its usage; a program that calls it for others sets it.
 fn program() -> String {
     std::env::var("TRACTIVE_PROGRAM").unwrap_or("cargo rig".to_owned()) + " run"
 }
 
-/// Reads the words behind `run`. The error is clap's own where it says more than a line, or help that was asked for.
+/// Reads the words after `run`. The error is clap's own if it says more than a line or is help that was asked for.
 pub fn choose<W: Into<OsString>>(words: impl IntoIterator<Item = W>) -> Result<Chosen> {
     let words: Vec<_> = words.into_iter().map(Into::into).collect();
     let Some(name) = name(&words) else { return Err(help().into()) };

@@ -1,4 +1,4 @@
-//! `run`: drives a scenario, writes its files and says what came of it.
+//! `run`: drives a scenario, writes its files and reports the outcome.
 
 use super::catalogue::{self, Chosen};
 use super::{Choice, System};
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Runs what the words behind `run` say. Exit code 1 where the drive tripped or a bound is not kept.
+/// Runs the words after `run`. Exit code 1 if the drive tripped or a bound is not kept.
 pub fn run(words: Vec<OsString>) -> Result<ExitCode> {
     match catalogue::choose(words)? {
         Chosen::Traction(choice) => run_choice(&choice),
@@ -57,7 +57,7 @@ fn run_choice<S: System>(choice: &Choice<S>) -> Result<ExitCode> {
     Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// The folder for the files of a run, made.
+/// Creates the folder for the files of a run.
 pub fn folder(name: &str, options: &RunOptions) -> Result<PathBuf> {
     let usual = || std::env::var_os("TRACTIVE_OUT").map_or("target/tractive".into(), PathBuf::from);
     let out = options.out.clone().unwrap_or_else(|| usual().join(name));
@@ -67,7 +67,7 @@ pub fn folder(name: &str, options: &RunOptions) -> Result<PathBuf> {
 
 /// The figures, and the run that they come from.
 pub fn summary<S: System>(choice: &Choice<S>, figures: &Figures, machine: &Machine) -> Result<Value> {
-    // The summary shows what was used, not that nothing was said.
+    // The summary shows the values that were used, even those that nobody gave.
     let mut options = serde_json::to_value(choice.filled(machine))?;
     if let Value::Object(options) = &mut options {
         options.insert("machine".to_owned(), choice.machine_name().into());
@@ -112,7 +112,7 @@ pub fn write<S: System>(
     write_text(&out.join("report.html"), &page.finish(&subtitle, figures)?)
 }
 
-/// Says on the page what was run: machine, link, law, and each option that was given or filled in.
+/// Writes on the page what was run: machine, link, law, and each option that was given or filled in.
 fn ran<S: System>(choice: &Choice<S>, machine: &Machine, page: &mut Page) -> Result<()> {
     let (name, folder) = (machine.tables.name, choice.machine_name());
     page.ran("machine", if name == folder { name.to_owned() } else { format!("{name} ({folder})") });
@@ -128,7 +128,7 @@ fn ran<S: System>(choice: &Choice<S>, machine: &Machine, page: &mut Page) -> Res
     page.ran("flaws", flaws);
     let Value::Object(mut options) = serde_json::to_value(choice.filled(machine))? else { return Ok(()) };
     options.extend(choice.own.clone());
-    // Said above, or off.
+    // Stated above, or off.
     let said = |name: &str| matches!(name, "machine" | "udc" | "on");
     let off = |value: &Value| value.is_null() || *value == json!(false) || value.as_f64() == Some(0.0);
     for (name, value) in options.iter().filter(|(name, value)| !said(name) && !off(value)) {

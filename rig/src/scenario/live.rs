@@ -1,10 +1,10 @@
-//! Drives that somebody drives by hand: what is the same of both systems.
+//! Drives that somebody drives by hand: the parts that both systems share.
 
 use tractive::operator::{Levels, State};
 
-/// Whoever drives looks and orders once in this time, in s: the operator's slot.
+/// Period in which the person driving looks and gives orders once, in s: the operator's slot.
 pub const TURN_S: f64 = 1e-3;
-/// Time for which an acknowledge stands, in s, so that a slot sees it.
+/// Time for which an acknowledge is set, in s, so that a slot sees it.
 pub const ACKNOWLEDGE_S: f64 = 3e-3;
 /// Time after which a command that was refused is given again, in s.
 const AGAIN_S: f64 = 50e-3;
@@ -14,11 +14,11 @@ const AGAIN_S: f64 = 50e-3;
 pub enum Command {
     /// A torque.
     Torque(f64),
-    /// A speed, held by a loop as a vehicle's computer has one.
+    /// A speed, held by a loop like that of a vehicle's computer.
     Speed(f64),
 }
 
-/// The rotor's fate.
+/// The rotor's state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turning {
     /// Held at a speed, in r/min.
@@ -50,7 +50,7 @@ pub struct Wanted {
 impl Wanted {
     /// The operator's levels in a state, at a time in s.
     pub fn levels(&self, state: State, now_s: f64, acknowledge: bool) -> Levels {
-        // An edge that was refused is given again some slots later.
+        // A refused edge is given again some slots later.
         let again = now_s % AGAIN_S < ACKNOWLEDGE_S;
         let closed = !matches!(state, State::Init | State::SelfTest | State::Ready | State::Precharge);
         Levels {

@@ -1,4 +1,4 @@
-//! Scenarios, the frame of both systems: a plan that is driven, and figures that are to be seen. Their scenarios stand side by side below.
+//! Scenarios, the frame of both systems: a plan to drive and figures to report. The scenarios of each system are in the modules below.
 
 pub mod catalogue;
 pub mod command;
@@ -23,7 +23,7 @@ use tractive::protection::{Fault, Trip};
 pub trait System: Sized + 'static {
     /// Its name in reports.
     const NAME: &'static str;
-    /// The machine folder it has unless told otherwise: the paper's.
+    /// The machine folder that it has by default: the paper's.
     const MACHINE: &'static str;
     /// Options that its scenarios share, besides [`RunOptions`].
     type Own: Args + Serialize + Clone;
@@ -32,25 +32,25 @@ pub trait System: Sized + 'static {
     /// The recording that a run leaves.
     type Recording: Recorded;
 
-    /// Step of the trace unless options or scenario say another, in s.
+    /// Step of the trace unless options or scenario set another, in s.
     fn trace_step_s(own: &Self::Own) -> f64;
-    /// Voltage of the DC source unless the options say another, in V.
+    /// Voltage of the DC source unless the options set another, in V.
     fn source_v(machine: &Machine) -> f64 {
         machine.folder.parameters.dc_link_nominal_v
     }
-    /// Shortest pulse unless the options say another, in µs; `None` where the modulator knows none.
+    /// Shortest pulse unless the options set another, in µs; `None` if the modulator has none.
     fn min_pulse_us(_machine: &Machine) -> Option<f64> {
         None
     }
-    /// A scenario's command line as this system has it: without the options of all runs that are nothing to it.
+    /// A scenario's command line for this system: without those options of all runs that do not apply to it.
     fn tailored(command: Command) -> Command {
         command
     }
-    /// The options with what those stand for that name others.
+    /// The options after each one that stands for others has been expanded.
     fn filled(options: &Options<Self::Own>, _machine: &Machine) -> Options<Self::Own> {
         options.clone()
     }
-    /// Checks that options are within their ranges; `scenario` are those of the scenario itself, by name.
+    /// Checks that options are within their ranges; `scenario` holds those of the scenario itself, by name.
     fn check(options: &Options<Self::Own>, scenario: &Map<String, Value>, machine: &Machine) -> Result<()>;
     /// Drives a plan, on the host or in QEMU; with a supervisor over the protocol until it ends the run.
     fn run(
@@ -60,10 +60,10 @@ pub trait System: Sized + 'static {
         machine: &Machine,
         supervisor: Option<&mut dyn Supervisor>,
     ) -> Result<Self::Recording>;
-    /// Figures of a scenario that is about nothing in particular.
+    /// Figures of a scenario that has none of its own.
     fn figures(recording: &Self::Recording) -> Figures;
-    /// Draws what every scenario shows, behind its own plots: what the flight recorder holds of a fault, and a line behind a filter, nothing
-    /// without them; marks what happened.
+    /// Draws what every scenario shows, after its own plots: the flight recorder's records of a fault and a line behind a filter, if there are
+    /// any; marks what happened.
     fn draw_common(recording: &Self::Recording, page: &mut Page);
     /// One picture of the whole run, if the system has one.
     fn overview(_recording: &Self::Recording) -> Result<Option<String>> {
@@ -79,11 +79,11 @@ pub trait Scenario<S: System> {
     fn figures(&self, recording: &S::Recording, _: &Options<S::Own>, _machine: &Machine) -> Figures {
         S::figures(recording)
     }
-    /// Step of the trace unless the options say another, in s.
+    /// Step of the trace unless the options set another, in s.
     fn trace_step_s(&self, own: &S::Own) -> f64 {
         S::trace_step_s(own)
     }
-    /// The fault that it is about, if it is about one: a run without it falls short, not with it.
+    /// The fault that the scenario is about, if any: a run falls short without it, not with it.
     fn fault(&self) -> Option<Fault> {
         None
     }
@@ -131,17 +131,17 @@ impl<S: System> Choice<S> {
         figures
     }
 
-    /// The first fault of a run, but for the one that the scenario is about.
+    /// The first fault of a run, except the one that the scenario is about.
     pub fn trip(&self, recording: &S::Recording) -> Option<Trip> {
         recording.trip().filter(|trip| self.scenario.fault() != Some(trip.fault))
     }
 
-    /// The options with the step of the trace that the scenario takes, the source's voltage and the shortest pulse, where none was given.
+    /// The options, with the scenario's step of the trace, the source's voltage and the shortest pulse filled in if none was given.
     pub fn filled(&self, machine: &Machine) -> Options<S::Own> {
         filled(self.scenario.as_ref(), &self.options, machine)
     }
 
-    /// The paper's figure that a run of this machine answers, and what it is: that of another machine answers none.
+    /// The paper's figure that a run of this machine answers, and what it is; a run of another machine answers none.
     pub fn title(&self, machine: &Machine) -> String {
         if machine.is(S::MACHINE) {
             return self.figure.to_owned();

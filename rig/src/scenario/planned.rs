@@ -1,4 +1,4 @@
-//! Scenarios that are driven for their trace and their figures, without pages, where there are no files.
+//! Scenarios that are driven for their trace and their figures, without pages, for places without files.
 
 use super::traction::{self, Traction};
 use super::zs9::{self, Zs9};
@@ -11,7 +11,7 @@ use clap::{ArgMatches, Args, Command, FromArgMatches};
 use serde::Serialize;
 use serde_json::Map;
 
-/// A scenario by name, and what drives it as its command line does.
+/// A scenario by name, and the function that drives it as its command line does.
 pub struct Planned<S: System> {
     /// The name on the command line.
     pub name: &'static str,
@@ -30,7 +30,7 @@ impl<S: System> Planned<S> {
         Self { name, drive: driven::<S, T> }
     }
 
-    /// Drives it with the words of its command line on a machine of these; its recording and its figures.
+    /// Drives it with the words of its command line on one of these machines; returns its recording and its figures.
     pub fn drive(
         &self,
         words: &[String],
@@ -56,7 +56,7 @@ fn driven<S: System, T: Scenario<S> + Args + Serialize>(
     Ok((recording, figures))
 }
 
-/// A command line with the options that all scenarios of a system share, read; once for all of them, for the size of the page.
+/// Reads a command line with the options that all scenarios of a system share: one function for all of them keeps the page small.
 #[inline(never)]
 fn read<O: Args + Clone>(command: Command, words: &[String]) -> Result<(ArgMatches, Options<O>)> {
     let matches = Options::<O>::augment_args(command).try_get_matches_from(words)?;

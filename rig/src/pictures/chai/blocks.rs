@@ -4,7 +4,7 @@ use super::super::diagram::Diagram;
 use super::super::sheet::{GREEN, VIOLET};
 use anyhow::Result;
 
-/// Figure 2: control and modulation in the timer's interrupt, the PWM interrupt plays.
+/// Figure 2: control and modulation run in the timer's interrupt, and the PWM interrupt plays.
 pub fn control() -> Result<String> {
     let mut all = Diagram::new((1000, 430), "Control decides which voltage, modulation which pulses");
     all.part((16.0, 34.0, 760.0, 188.0), "timer interrupt: control", GREEN)

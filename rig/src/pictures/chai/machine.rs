@@ -11,7 +11,7 @@ use tractive_tablegen::SmoothMap;
 const SPEEDS: [f64; 4] = [1.0, 1.5, 2.0, 3.0];
 /// Largest current of the paper's machine, in A: distances of letters from their spots are in amperes of its plane.
 const PAPERS_A: f64 = 233.345;
-/// Largest current's share below which a point of the outer locus is inside the circle.
+/// Share of the largest current below which a point of the outer locus is inside the circle.
 const ON_THE_CIRCLE: f64 = 0.995;
 
 /// Figure 1: MTPA (O–A1), along the current's limit (A1–A2), MTPV (A2–A3), constant torque in weakening (BC, DE).
@@ -97,7 +97,7 @@ fn label_end(panel: &mut Panel, curve: &[Point], words: &str, unit: f64) {
 pub fn inductance(machine: &Machine, d_axis: bool) -> Result<String> {
     let map = SmoothMap::new(&machine.folder.map);
     let largest = machine.folder.parameters.max_current_a;
-    // Where mH would have more than three digits behind the point.
+    // True if mH would have more than three digits behind the point.
     let small = map.at(0.0, largest).psi_q_wb < 2e-4 * largest;
     let (unit, parts) = if small { ("µH", 1e6) } else { ("mH", 1e3) };
     let (along, other, what) = if d_axis { ("i_{d}", "i_{q}", "L_{d}") } else { ("i_{q}", "i_{d}", "L_{q}") };

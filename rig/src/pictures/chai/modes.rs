@@ -15,7 +15,7 @@ use tractive::modulation::{Ladder, Mode, index_limit};
 
 const COLOURS: [Colour; 6] = [GREY, BLUE, GREEN, ORANGE, VIOLET, RED];
 
-/// Figure 6: the devices' switching frequency over the stator's at full torque, by the mode that the drive was in.
+/// Figure 6: the ratio of the devices' switching frequency to the stator's at full torque, by the mode that the drive was in.
 pub fn strategy(recording: &Recording, machine: &Machine) -> Result<String> {
     let most_hz = f64::from(machine.tables.ratings.max_switching_hz);
     let full_nm = worst(recording.rows.iter().map(|row| row.te_ref_nm)).unwrap_or(0.0);
@@ -75,12 +75,12 @@ pub fn level(edges: &[LegEdge], f1_hz: f64, leg: usize) -> Vec<Point> {
     points
 }
 
-/// The share of six-step at which a notched mode is drawn: notches of much the same width.
+/// The share of six-step at which a notched mode is drawn, so that its notches have much the same width.
 pub fn drawn_share(mode: Mode) -> f64 {
     1.0 - 0.05 * f64::from(mode.turn_ons() - 1)
 }
 
-/// Figure 7: the legs' levels of a middle-60° mode; where the legs' middle 60° lie is shaded.
+/// Figure 7: the legs' levels of a middle-60° mode; the legs' middle 60° are shaded.
 pub fn middle60(machine: &Machine, mode: Mode) -> Result<Panel> {
     let (f1_hz, share) = (100.0, drawn_share(mode));
     let edges = pulses(machine, mode, f1_hz, share)?;

@@ -28,7 +28,7 @@ fn curve(recording: &Recording, (from_s, to_s): (f64, f64), value: fn(&Row) -> f
     rows.iter().map(|row| (row.t_s, value(row))).collect()
 }
 
-/// The step that figure 8 shows closer: its time in s, and the time before and after it that is drawn.
+/// The step that figure 8 shows as a close-up: its time in s, and the time before and after it that is drawn.
 const CLOSER: (f64, f64, f64) = (0.3, 0.004, 0.012);
 
 /// Line voltage, phase current and torque around one step, one above the other from a height on.
@@ -59,7 +59,7 @@ fn closer(recording: &Recording, mut top: f64) -> Vec<Panel> {
     sheet
 }
 
-/// Figure 8: link voltage, line voltage, phase current and torque of the load steps, one above the other, and one step closer.
+/// Figure 8: link voltage, line voltage, phase current and torque of the load steps, one above the other, and a close-up of one step.
 pub fn load_steps(recording: &Recording) -> Result<String> {
     let end_s = recording.rows.last().map_or(1.0, |row| row.t_s);
     let window = (0.0, end_s);
@@ -120,7 +120,7 @@ pub fn changes(recording: &Recording) -> Result<String> {
     draw((1000, 780), &sheet)
 }
 
-/// A value of a steady point, where it has one.
+/// A value of a steady point, if it has one.
 type OfPoint = fn(&SteadyPoint) -> Option<f64>;
 
 /// Figure 10: torque accuracy, efficiency and current at the characteristic points above rated torque; the rated point beside them.

@@ -14,7 +14,7 @@ pub fn circuit() -> Result<String> {
         "nine switches",
         BLUE,
     );
-    // Source and its switch, which carries current either way.
+    // The source and its switch, which carries current in both directions.
     all.wire(&[(40.0, 210.0), (40.0, top), (70.0, top)])
         .block((70.0, top - 16.0, 60.0, 32.0), "S_{1} ⇄")
         .wire(&[(130.0, top), (190.0, top)])
@@ -60,7 +60,7 @@ pub fn circuit() -> Result<String> {
     all.finish()
 }
 
-/// Figure 10: control of the whole.
+/// Figure 10: control of the whole system.
 pub fn control() -> Result<String> {
     let mut all = Diagram::new(
         (1000, 480),
@@ -114,7 +114,7 @@ pub fn control() -> Result<String> {
     all.finish()
 }
 
-/// Figure 11: control of the link's voltage by that of the capacitors.
+/// Figure 11: control of the link's voltage by means of the capacitors'.
 pub fn link() -> Result<String> {
     let mut all = Diagram::new(
         (1000, 270),

@@ -68,7 +68,7 @@ pub fn is_on(period: &Period, gate: usize, t: f64) -> bool {
     gate.starts_on() ^ (gate.toggles().filter(|at| f64::from(*at) <= t).count() % 2 == 1)
 }
 
-/// A leg's state at a time in periods: −1, 0 or 1; nothing where it is shorted.
+/// A leg's state at a time in periods: −1, 0 or 1; none if it is shorted.
 pub fn leg(period: &Period, leg: usize, t: f64) -> Option<i8> {
     match LegState::of_gates(is_on(period, leg, t), is_on(period, leg + 3, t), is_on(period, leg + 6, t)) {
         Some(LegState::One) => Some(1),
@@ -78,7 +78,7 @@ pub fn leg(period: &Period, leg: usize, t: f64) -> Option<i8> {
     }
 }
 
-/// The vectors of a period: from, to, and the number of each, 1 to 15; 0 where a leg is shorted.
+/// The vectors of a period: from, to, and the number of each, 1 to 15; 0 if a leg is shorted.
 pub fn vectors(period: &Period) -> Vec<(f64, f64, usize)> {
     let mut found: Vec<(f64, f64, usize)> = Vec::new();
     for pair in instants(period).windows(2) {
@@ -93,7 +93,7 @@ pub fn vectors(period: &Period) -> Vec<(f64, f64, usize)> {
     found
 }
 
-/// A level that changes at instants alone, as the corners of its curve.
+/// A level that changes only at instants, as the corners of its curve.
 pub fn steps(period: &Period, level: impl Fn(f64) -> f64) -> Vec<Point> {
     let parts = instants(period);
     let corners = parts.windows(2).map(|pair| (pair[0], pair[1], level(0.5 * (pair[0] + pair[1]))));

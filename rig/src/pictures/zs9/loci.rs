@@ -1,4 +1,4 @@
-//! The second paper's currents: figures 12 and 13. Its motor is linear, so that ellipses are written down.
+//! The second paper's currents: figures 12 and 13. Its motor is linear, so the ellipses are known in closed form.
 
 use super::super::ink::draw;
 use super::super::loci::Loci;
@@ -72,7 +72,7 @@ pub fn limits(machine: &Machine) -> Result<String> {
         flux <= motor.flux_wb(1500.0)
     };
     both.extend(edge.filter(inside));
-    // Convex, so in the order of their angles about a point within.
+    // Convex, so its corners are in the order of their angles about a point within.
     let middle = (-0.8 * largest, 0.0);
     both.sort_by(|a, b| {
         let angle = |point: &Point| (point.1 - middle.1).atan2(point.0 - middle.0);
@@ -104,7 +104,7 @@ fn plane(title: &str, largest: f64, low: f64) -> Panel {
     Panel::plane((0.0, 0.0, 900.0, 640.0), title, x, y)
 }
 
-/// Figure 13: the current's way from standstill up: MTPA to A1, along the circle from there. MTPV (A2 to A4) lies outside it.
+/// Figure 13: the current's path from standstill up: MTPA to A1, then along the circle. MTPV (A2 to A4) lies outside it.
 pub fn ways(machine: &Machine) -> Result<String> {
     let parameters = &machine.folder.parameters;
     let (motor, loci) = (Linear::of(machine), Loci::new(machine, parameters.dc_link_nominal_v));

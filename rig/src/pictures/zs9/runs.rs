@@ -36,7 +36,7 @@ fn stacked(recording: &Recording, (from_s, to_s): (f64, f64), parts: &[Part]) ->
     draw((880, (HEIGHT * parts.len() as f64) as u32), &panels)
 }
 
-/// `true` if a value is another one most of the time, so that its curve would hide the other's.
+/// `true` if one value equals another most of the time, so that its curve would hide the other's.
 fn lies_on(rows: &[Row], value: Value, other: Value) -> bool {
     const NEAR: f64 = 0.5;
     let near = |row: &&Row| (value(row) - other(row)).abs() < NEAR;
@@ -74,7 +74,7 @@ fn phases<'a>(title: &'a str, which: usize) -> Part<'a> {
     (title, "A", vec![("a", a, BLUE), ("b", b, RED), ("c", c, GREEN)])
 }
 
-/// Figures 14 to 19: motor 2's load steps at 0.6 s, motor 1 goes on.
+/// Figures 14 to 19: motor 2's load steps at 0.6 s, motor 1 carries on.
 pub fn load_step(recording: &Recording) -> Result<String> {
     let parts = [
         link(),
@@ -92,7 +92,7 @@ pub fn load_step_speed(recording: &Recording) -> Result<String> {
     stacked(recording, (0.5, 0.8), &[speed2("Speed of motor 2 when its load steps by 40 N·m")])
 }
 
-/// Figures 20 to 23: motor 2 reverses, motor 1 goes on.
+/// Figures 20 to 23: motor 2 reverses, motor 1 carries on.
 pub fn reverse(recording: &Recording) -> Result<String> {
     let parts = [torques(), speed1("Speed of motor 1"), link(), inductor()];
     stacked(recording, (0.3, 1.8), &parts)
@@ -139,7 +139,7 @@ pub fn over_speed(recording: &Recording) -> Result<String> {
             Axis::fitted(unit),
         );
         for (name, colour, brakes) in [("motoring", BLUE, false), ("braking", RED, true)] {
-            // What is no number ends a curve.
+            // A value that is no number ends a curve.
             let of = |row: &Row| match (row.motors[0].torque_ref_nm < 0.0) == brakes {
                 true => (row.motors[0].speed_rpm, value(row)),
                 false => (f64::NAN, f64::NAN),

@@ -74,7 +74,7 @@ fn reference(panel: &mut Panel, which: usize) {
     panel.words(polar(0.285, 26.0), &format!("V_{{ref{}}}", which + 1), Side::Right, VIOLET);
 }
 
-/// Figure 7: which zero vector ZVO-SVPWM takes where, asked of the modulator degree by degree.
+/// Figure 7: the zero vector that ZVO-SVPWM takes at each angle, obtained from the modulator degree by degree.
 pub fn figure7() -> Result<String> {
     let outer = |degrees: i32| takes(f64::from(degrees) + 0.5, true);
     let inner = |degrees: i32| takes(f64::from(degrees) + 0.5, false);

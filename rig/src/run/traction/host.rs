@@ -22,7 +22,7 @@ use tractive::time::{Clock, Instant};
 struct Port<'a, 'w> {
     bench: &'a mut Bench,
     without: Option<Ablation>,
-    /// The bench's command beside the newest sample, and what a position sensor without an angle had counted.
+    /// The bench's command beside the newest sample, and the count of a position sensor without an angle.
     command: DriveCommand,
     counted: Option<Angle>,
     ratings: &'a Ratings,
@@ -32,16 +32,16 @@ struct Port<'a, 'w> {
     error: Option<anyhow::Error>,
 }
 
-/// The drive's end of the protocol, and who is at the other end.
+/// The drive's end of the protocol, and the supervisor at the other end.
 struct Wire<'w> {
     station: CanEndpoint,
     supervisor: &'w mut dyn Supervisor,
-    /// The frames of an identification, where the drive's leave room.
+    /// The frames of an identification, sent if the drive's own leave room.
     teller: Option<(Teller, &'w Memory)>,
 }
 
 impl Port<'_, '_> {
-    /// The findings that drivers and monitors of the legs still tell.
+    /// The findings that the legs' drivers and monitors still report.
     fn found(&self) -> LegFaults {
         let found = self.bench.leg_faults();
         self.without.map_or(found, |without| without.leg_faults(found))
@@ -162,11 +162,11 @@ pub struct Tasks<'a, L = Controller> {
     after_control: Option<AfterControl<'a, L>>,
 }
 
-/// The work of an image with its law at the end of a control interrupt that began at the instant; `true` if that begins a slot.
+/// The work that an image does with its law at the end of a control interrupt that began at the instant; `true` if that begins a slot.
 type AfterControl<'a, L> = Box<dyn FnMut(&mut L, Instant, bool) + 'a>;
 
 impl Tasks<'_> {
-    /// Before their first interrupts.
+    /// The tasks before their first interrupts.
     pub fn new(tables: &'static Tables, settings: Settings, first_half_ticks: u32) -> Self {
         Self::beginning_at(Instant(0), tables, settings, first_half_ticks)
     }
@@ -206,7 +206,7 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
         }
     }
 
-    /// The same with something that is done at the end of each control interrupt.
+    /// The same with an action at the end of each control interrupt.
     pub fn doing(mut self, after_control: impl FnMut(&mut L, Instant, bool) + 'a) -> Self {
         self.after_control = Some(Box::new(after_control));
         self
@@ -218,7 +218,7 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
         self
     }
 
-    /// The same with an operator that knows temperature sensors, and how what they are on warms.
+    /// The same with an operator that knows temperature sensors, and how the parts that they are on warm up.
     pub fn warmed_by(mut self, thermal: Option<&'static Thermal>) -> Self {
         self.operator.thermal = thermal;
         self
@@ -237,7 +237,7 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
         self
     }
 
-    /// The same with the frames of what an identification keeps.
+    /// The same with the frames that carry the contents of an identification's memory.
     pub fn telling(mut self, memory: &'a Memory) -> Self {
         if let Some(wire) = &mut self.wire {
             wire.teller = Some((Teller::new(), memory));
@@ -256,7 +256,7 @@ impl<'a, L: ControlLaw> Tasks<'a, L> {
         Self { control: self.control.scheduled(Schedule::on(ladder, &self.clock)), ..self }
     }
 
-    /// The same with a protection off, or none; its levels are the tables' business.
+    /// The same with a protection switched off, or none; its levels come from the tables.
     pub fn without(self, without: Option<Ablation>) -> Self {
         let masked = without.map_or(MaskedFaults::NONE, Ablation::masked);
         let (control, pwm) = (self.control.without(masked), self.pwm.without(masked));
@@ -303,7 +303,7 @@ impl<L: ControlLaw> Interrupts for Tasks<'_, L> {
         if let Some(after_control) = &mut self.after_control {
             after_control(self.control.law_mut(), now, self.shared.operator.has_told(now));
         }
-        // The idle loop goes on where the interrupt ends.
+        // The idle loop continues when the interrupt ends.
         if port.bench.is_operated() {
             self.slot.run(&self.shared.operator, &mut port, &operator, &self.clock);
         }

@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use tractive::modulation::Mode;
 use tractive::wire::{self, Block, Request};
 
-/// Runs until the recording is complete, with the set-up that answers the image's first request; a supervisor commands over the protocol.
+/// Runs until the recording is complete, with the set-up that answers the image's first request; a supervisor gives commands over the protocol.
 pub fn run_in_qemu(
     name: &str,
     bench: Bench,

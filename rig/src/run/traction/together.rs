@@ -1,7 +1,7 @@
 //! Several drives on one link: each with its own bench, tasks and machine, all of them behind one line filter.
 //!
-//! Between two events of any of them the link's voltage stands still and all machines turn on under it; then the link gives what they took together. With one drive
-//! that is what its own bench does.
+//! Between two events of any drive, the link's voltage is held and all machines turn on at that voltage; then the link supplies what they
+//! took together. With one drive, its own bench does the same.
 
 use crate::bench::{Bench, Simulated, Terminal, Tick};
 use crate::plant::FilteredLink;
@@ -23,7 +23,7 @@ impl<T: Interrupts<Bench = Bench>> OnBench<T> {
     }
 }
 
-/// The link and the drives on it; the first one's line is everybody's.
+/// The link and the drives on it; all of them share the first one's line.
 pub struct Together<T> {
     /// The link.
     pub link: FilteredLink,
@@ -34,7 +34,7 @@ pub struct Together<T> {
 }
 
 impl<T: Interrupts<Bench = Bench>> Together<T> {
-    /// Until the first drive's recording is complete; `show` is told how far it is.
+    /// Runs until the first drive's recording is complete; `show` is told the progress.
     pub fn drive(&mut self, mut show: impl FnMut(f64)) -> Result<()> {
         while !self.first.bench.is_done() {
             let next = self.all().map(|drive| drive.next_call()).fold(Tick::MAX, Tick::min);

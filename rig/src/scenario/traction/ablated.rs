@@ -1,6 +1,6 @@
-//! The project's control law with one part of it taken away, to see what the part buys.
+//! The project's control law with one part of it taken away, to show the benefit of that part.
 //!
-//! Each stage of the law is called with other inputs than the drive's, so the law itself is the image's, instruction for instruction.
+//! Each stage of the law is called with inputs other than the drive's, so the law itself is the image's, instruction for instruction.
 
 use clap::ValueEnum;
 use serde::Serialize;
@@ -24,7 +24,7 @@ pub enum Part {
     Observer,
     /// The sixth harmonic in the observer
     Sixth,
-    /// Torque of the ripple, foreseen by the map
+    /// Torque of the ripple, predicted from the map
     Foreseen,
     /// Trim of mean torque
     Trim,

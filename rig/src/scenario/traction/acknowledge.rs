@@ -1,4 +1,4 @@
-//! A gate driver fails under torque: the fault, what is refused meanwhile, the acknowledge, and the machine caught again.
+//! A gate driver fails under torque: the fault, the commands refused meanwhile, the acknowledge, and the machine caught again.
 
 use super::line::{self, within};
 use super::prelude::*;
@@ -57,7 +57,7 @@ impl Scenario<Traction> for Acknowledge {
         let states = line::states(recording);
         let others = states.iter().map(|entered| entered.state).ne(STATES.split(' '));
         let named = recording.trip().is_some_and(|trip| trip.fault == FAULT);
-        // Current flows on through the diodes until the field is empty.
+        // Current continues to flow through the diodes until the field is empty.
         let dead = analysis::window(recording, FAILS_S.0 + 0.05, 2.3);
         let largest_a = machine.folder.parameters.max_current_a;
         let current = worst(dead.iter().map(|row| row.peak_current_a() / largest_a));

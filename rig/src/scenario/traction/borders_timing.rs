@@ -1,24 +1,24 @@
-//! A short drive to and fro across each border between two modes, and in and out of pulses, for `cargo xtask test --only preemption`: what
-//! control executes while a mode changes and no longer.
+//! A short drive to and fro across each border between two modes, and in and out of pulses, for `cargo xtask test --only preemption`: it
+//! covers the code that control executes only while a mode changes.
 
 use super::prelude::*;
 use super::scaled::{of_rated_rpm, ramp_scale};
 use super::script::Script;
 
-/// Full torque, at speeds that swing across a border, and an enable that comes and goes.
+/// Full torque at speeds that swing across a border, with an enable that comes and goes.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct BordersTiming;
 
-/// Speeds at which the mode has changed going up and down at full torque, with a little room, in r/min.
+/// Speeds by which the mode has changed on the way down and on the way up at full torque, with a little margin, in r/min.
 const SWINGS_RPM: [(f64, f64); 5] =
     [(550.0, 620.0), (835.0, 915.0), (1050.0, 1145.0), (1650.0, 1760.0), (1835.0, 1910.0)];
 const SWINGS: usize = 4;
-/// From one end of a swing to the other, longer than a mode stays at least, and from one border to the next, in s. A quicker ramp would
-/// count as a lost angle.
+/// Times from one end of a swing to the other, longer than the shortest stay in a mode, and from one border to the next, in s. A quicker
+/// ramp would count as a lost angle.
 const HALF_SWING_S: f64 = 0.034;
 const RAMP_S: f64 = 0.02;
-/// Long enough for what control does now and then; then the enable goes and comes, in s. It comes once in nine halves of the asynchronous
-/// carrier, so always as near before a boundary as here the first time.
+/// Time long enough for control's occasional work, in s; then the enable goes and comes. It comes once in nine halves of the asynchronous
+/// carrier, so always as shortly before a boundary as the first time here.
 const FIRST_S: f64 = 0.0403;
 const PAUSES: usize = 24;
 const PAUSE_S: f64 = 0.0025;

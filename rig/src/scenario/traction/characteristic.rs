@@ -20,7 +20,7 @@ const POINTS: [(f64, f64); 7] = [
     (2000.0, 859.4),
     (2000.0, 1174.6),
 ];
-/// From one of these speeds to the next.
+/// Slope from one of these speeds to the next, in r/min per s.
 const SLOPE_RPM_S: f64 = 1000.0;
 const SETTLE_S: f64 = 0.6;
 const MEASURE_S: f64 = 0.3;
@@ -95,7 +95,7 @@ impl Scenario<Traction> for Characteristic {
     }
 
     fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
-        // The paper's figure is of the points, not of what flows at them.
+        // The paper's figure shows the points, not the waveforms at them.
         page.answers(None);
         page.torque(recording);
         page.plot("speed", "r/min", recording, &[("speed", |row| row.speed_rpm)]);
@@ -113,10 +113,10 @@ impl Scenario<Traction> for Characteristic {
     }
 }
 
-/// Above this share of its demand a point is not limited: what is left is single precision.
+/// Share of its demand above which a point is not limited: the rest is due to single precision.
 const WHOLE: f64 = 0.999;
 
-/// Bound of the mean torque: the one demanded, and where the link does not give it, what the drive says instead.
+/// Bounds of the mean torque, against the demand or, if the link does not allow that, against the torque that the drive reports.
 fn torque_verdicts(points: &[SteadyPoint], options: &RunOptions) -> Vec<Verdict> {
     let most = torque_bound(options, 0.3, 1.5);
     let (given, limited): (Vec<_>, Vec<_>) =

@@ -1,4 +1,4 @@
-//! Full braking into a link that cannot take the energy: the chopper takes it; half the resistor is lost, then all of it, and the torque
+//! Full braking into a link that cannot take the energy. The chopper takes it; half of the resistor is lost, then all of it, and the torque
 //! is folded back; then the source takes energy back and all of the torque returns.
 
 use super::line::{self, within};
@@ -18,18 +18,18 @@ pub struct Chopper {
 
 const ENABLE: (f64, f64) = (0.5, 4.4);
 const BRAKE: (f64, f64) = (0.7, 4.0);
-/// The rotor is held at this speed, in r/min, but for the braking to `SLOW_RPM` with the whole chopper.
+/// The rotor is held at this speed, in r/min, except for the braking to `SLOW_RPM` with the whole chopper.
 const FAST_RPM: f64 = 2_000.0;
 const SLOW_RPM: f64 = 1_200.0;
-/// Share of the link beyond which an EMF counts as near it; from standstill to the speed then, in s.
+/// Share of the link beyond which an EMF counts as near it; and times in which the rotor then goes from standstill to its speed, in s.
 const NEAR: f64 = 0.5;
 const TURNS: (f64, f64) = (0.3, 0.69);
-/// From when on half of the braking resistor is lost, then all of it, and the source takes energy back.
+/// Times from which half of the braking resistor is lost, then all of it, and the source takes energy back, in s.
 const HALF_S: f64 = 1.7;
 const NONE_S: f64 = 2.4;
 const TAKES_S: f64 = 3.1;
 const DURATION_S: f64 = 4.8;
-/// Rest of a resistor that is lost, over the whole one.
+/// Resistance of a lost resistor over that of the whole one.
 const LOST: f64 = 1e6;
 
 /// A stretch of the run.
@@ -41,7 +41,7 @@ struct Stretch {
     torque_nm: f64,
     chopper_duty: f64,
     braking_kw: f64,
-    /// Over all of it.
+    /// Peaks over all of it.
     link_peak_v: f64,
     current_peak_a: f64,
 }
@@ -69,7 +69,7 @@ fn stretches(recording: &Recording, machine: &Machine) -> Vec<Stretch> {
         .map(|(what, from, until)| {
             let rows = analysis::window(recording, from, until);
             let steady = &rows[rows.len() / 2..];
-            // What the copper takes never reaches the link.
+            // The copper loss never reaches the link.
             let copper_w = |row: &Row| 1.5 * ohm * (row.id_a.powi(2) + row.iq_a.powi(2));
             let shaft_w = |row: &Row| -row.te_nm * row.speed_rpm * core::f64::consts::TAU / 60.0;
             let power = |row: &Row| 1e-3 * (shaft_w(row) - copper_w(row));
@@ -92,7 +92,7 @@ impl Scenario<Traction> for Chopper {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let fast = self.speed.unwrap_or(of_rated_rpm(FAST_RPM, machine));
         let slow = fast * SLOW_RPM / FAST_RPM;
-        // Near the link's voltage the EMF would charge it: such a machine turns once the main contactor is closed.
+        // An EMF near the link's voltage would charge it, so such a machine turns only once the main contactor is closed.
         let near = emf_v(fast, machine) > NEAR * machine.folder.parameters.dc_link_nominal_v;
         let begins = near.then_some([(TURNS.0, 0.0), (TURNS.1, fast)]).into_iter().flatten();
         let later = [
@@ -123,7 +123,7 @@ impl Scenario<Traction> for Chopper {
         let stretches = stretches(recording, machine);
         let [whole, half, none, source] = &stretches[..] else { unreachable!("four stretches") };
         let (trip_v, highest_v) = (f64::from(ratings.trip_dc_over_v), f64::from(ratings.dc_link_max_v));
-        // Where the link's rise ends, between its highest operating voltage (0) and the trip (1).
+        // End of the link's rise, between its highest operating voltage (0) and the trip (1).
         let rise = |stretch: &Stretch| (stretch.link_peak_v - highest_v) / (trip_v - highest_v);
         let largest_a = f64::from(ratings.max_current_a);
         let most_kw = machine.folder.parameters.max_power_w / 1e3;

@@ -1,16 +1,16 @@
-//! Several drives on one line filter: the differences of the others from the first, and the operator that all of them have.
+//! Several drives on one line filter: how the others differ from the first, and the operator that all of them share.
 
 use crate::bench::Operator;
 use crate::plant::SpeedSource;
 use anyhow::{Result, ensure};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// By how much the wheels of each further drive on a line are larger, as a share.
+/// Share by which the wheels of each further drive on a line are larger.
 const LARGER_WHEELS: f64 = 0.01;
 /// The electrical angle at which each further drive's rotor begins, in turns.
 const FURTHER_TURNS: f64 = 0.37;
 
-/// The check that a drive is by itself, for whatever has no place for others.
+/// The check that a drive is alone, for everything that has no place for others.
 pub fn alone(drives: u32) -> Result<()> {
     ensure!(
         drives == 1,
@@ -19,7 +19,7 @@ pub fn alone(drives: u32) -> Result<()> {
     Ok(())
 }
 
-/// An operator whom several drives have.
+/// An operator shared by several drives.
 pub struct Shared(Arc<Mutex<Box<dyn Operator + Send>>>);
 
 impl Shared {
@@ -35,7 +35,7 @@ impl Shared {
     }
 }
 
-/// The speed of a further drive, from 1 on: lower where it is prescribed.
+/// The speed of a further drive, numbered from 1 on: lower if it is prescribed.
 pub fn speed(first: &SpeedSource, number: u32) -> SpeedSource {
     let share = 1.0 / (1.0 + f64::from(number) * LARGER_WHEELS);
     match first {

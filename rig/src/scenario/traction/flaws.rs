@@ -37,7 +37,7 @@ impl FromStr for Drops {
 }
 
 impl Drops {
-    /// The check that they are within their ranges for a link of so many V and a machine.
+    /// The check that they are within their ranges for a link voltage in V and a machine.
     pub fn check(&self, link_v: f64, machine: &Machine) -> Result<()> {
         let most_mohm = 1e3 * link_v / machine.folder.parameters.max_current_a;
         let Self([igbt_v, igbt_mohm, diode_v, diode_mohm]) = *self;
@@ -57,7 +57,7 @@ impl Drops {
         within(&[volts, slopes].concat())
     }
 
-    /// As the plant has them.
+    /// The drops as the plant has them.
     pub fn devices(&self) -> DeviceDrops {
         let Self([igbt_v, igbt_mohm, diode_v, diode_mohm]) = *self;
         DeviceDrops { igbt_v, igbt_ohm: 1e-3 * igbt_mohm, diode_v, diode_ohm: 1e-3 * diode_mohm }
@@ -93,7 +93,7 @@ impl FromStr for Elastic {
     }
 }
 
-/// So many numbers between commas; `None` if they are more or fewer.
+/// A given count of numbers between commas; `None` if there are more or fewer.
 fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
     let values: Option<Vec<f64>> = text.split(',').map(|value| value.trim().parse().ok()).collect();
     values?.try_into().ok()
@@ -131,13 +131,13 @@ impl Serialize for Elastic {
 /// The flaws' options.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct FlawOptions {
-    /// All flaws of a usual inverter at once, each as large as the guide's page on flaws says; one that is given as well keeps its own value.
+    /// All flaws of a usual inverter at once, each as large as the guide's page on flaws says; an option that is also given keeps its own value.
     #[arg(long)]
     pub real: bool,
     /// Offset of each current sensor, in percent of the converters' range.
     #[arg(long, value_name = "U,V,W", allow_hyphen_values = true)]
     pub current_offset: Option<Phases>,
-    /// By how much each phase's current is read larger than it is, in percent.
+    /// Excess of each phase's current reading over the true current, in percent.
     #[arg(long, value_name = "U,V,W", allow_hyphen_values = true)]
     pub current_gains: Option<Phases>,
     /// Phase of --angle-1f-deg, in degrees.
@@ -146,28 +146,28 @@ pub struct FlawOptions {
     /// Phase of --angle-2f-deg, in degrees.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
     pub angle_2f_phase_deg: f64,
-    /// Time after its sample in which the angle is read, in µs; each time at another instant.
+    /// Interval after its sample within which the angle is read, in µs; each reading is at another instant.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
     pub angle_jitter_us: f64,
-    /// Sixth harmonic of the magnets' voltage over the rotor's angle, in percent of that voltage: slots.
+    /// Effect of the slots: sixth harmonic of the magnets' voltage over the rotor's angle, in percent of that voltage.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
     pub slots: f64,
-    /// By how much the magnets' flux linkage exceeds the map's, in percent of theirs: below 0 hot, above cold.
+    /// Excess of the magnets' flux linkage over the map's, in percent of the map's: below 0 hot, above cold.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
     pub magnets: f64,
     /// Threshold and slope of an IGBT, and of a diode.
     #[arg(long, value_name = "V,MOHM,V,MOHM", allow_negative_numbers = true)]
     pub device_drop: Option<Drops>,
-    /// The drive knows the mean threshold and slope of --device-drop, as by its power stage's key, and makes up for it.
+    /// The drive knows the mean threshold and slope of --device-drop, as from its power stage's key, and compensates for the drop.
     #[arg(long)]
     pub device_drop_known: bool,
-    /// Time by which each phase's current is sampled before the instant that all are taken for, in µs.
+    /// Time by which each phase's current is sampled before the common instant assumed for all phases, in µs.
     #[arg(long, value_name = "U,V,W", allow_negative_numbers = true)]
     pub adc_skew_us: Option<Times>,
     /// Iron loss as a torque that brakes the rotor, in percent of the iron and mechanical loss that machine.toml names.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "PERCENT")]
     pub iron_loss: f64,
-    /// An elastic shaft between the rotor and what turns it or is turned by it: natural frequency and damping ratio with the far end held.
+    /// An elastic shaft between the rotor and whatever it turns or is turned by: natural frequency and damping ratio with the far end held.
     #[arg(long, value_name = "HZ,DAMPING", allow_negative_numbers = true)]
     pub shaft: Option<Elastic>,
 }
@@ -176,13 +176,13 @@ pub struct FlawOptions {
 mod real {
     pub const DEAD_TIME_US: f64 = 5.0;
     pub const ADC_BITS: u32 = 12;
-    /// Of the largest current.
+    /// Share of the largest current.
     pub const NOISE_SHARE: f64 = 0.002;
-    /// Of the link's nominal voltage.
+    /// Share of the link's nominal voltage.
     pub const RIPPLE_SHARE: f64 = 0.02;
     pub const RIPPLE_HZ: f64 = 300.0;
     pub const RS_ERROR_PERCENT: f64 = 20.0;
-    /// Of the converters' range, and no larger share of the largest current than where the drive trips at 1.31 of it.
+    /// Percent of the converters' range, but no larger share of the largest current than on a drive that trips at 1.31 of it.
     pub const OFFSET_PERCENT: [f64; 3] = [2.0, 0.0, 0.0];
     pub const OFFSET_TRIP: f64 = 1.31;
     pub const GAINS_PERCENT: [f64; 3] = [1.0, -1.0, 0.0];
@@ -197,7 +197,7 @@ mod real {
     pub const SKEW_US: [f64; 3] = [2.0, 1.0, 0.0];
     pub const IRON_PERCENT: f64 = 50.0;
     pub const SHAFT: [f64; 2] = [40.0, 0.05];
-    /// Link voltage in V, current in A and switching frequency in Hz of the machine that they are those of.
+    /// Link voltage in V, current in A and switching frequency in Hz of the machine that these flaws belong to.
     pub const LINK_V: f64 = 1_500.0;
     pub const CURRENT_A: f64 = 233.345;
     pub const SWITCHING_HZ: f64 = 900.0;
@@ -205,7 +205,7 @@ mod real {
 
 /// Longest time by which a phase's current is sampled early, as a share of the fastest carrier.
 const MOST_SKEW: f64 = 0.02;
-/// Highest natural frequency of a shaft, in Hz: a tenth of a radian of it is longer than the plant's steps.
+/// Highest natural frequency of a shaft, in Hz: a tenth of a radian of it lasts longer than the plant's steps.
 const MOST_SHAFT_HZ: f64 = 400.0;
 
 /// The value that was given, or that of `--real`.
@@ -216,47 +216,47 @@ fn or(given: f64, real: f64) -> f64 {
 /// The flaws that have options of their own beside these.
 #[derive(Clone, Copy, Debug)]
 pub struct Beside {
-    /// By how much the link is read larger than it is, in percent.
+    /// Excess of the link's reading over its true voltage, in percent.
     pub udc_gain: f64,
     /// Time constant of the current sensors, in µs.
     pub current_filter_us: f64,
-    /// Errors of the angle that go once and twice with it, in degrees.
+    /// Angle errors that occur once and twice per electrical turn, in degrees.
     pub angle_deg: [f64; 2],
 }
 
 /// Options with everything that `--real` stands for.
 #[derive(Clone, Debug)]
 pub struct Filled {
-    /// Those of every run.
+    /// The options of every run.
     pub run: RunOptions,
-    /// Those beside the flaws' own.
+    /// The options beside the flaws' own.
     pub beside: Beside,
-    /// The flaws' own.
+    /// The flaws' own options.
     pub flaws: FlawOptions,
 }
 
-/// The inverter that `--real` has the flaws of.
+/// The inverter whose flaws `--real` stands for.
 #[derive(Clone, Copy, Debug)]
 pub struct RealInverter {
     /// Voltage that its devices switch, in V.
     pub link_v: f64,
-    /// The rate at which they do, in Hz.
+    /// The rate at which they switch it, in Hz.
     pub switching_hz: f64,
 }
 
 impl RealInverter {
-    /// The two-level one that a machine is made for.
+    /// The two-level inverter that a machine is made for.
     pub const fn of(machine: &Machine) -> Self {
         let parameters = &machine.folder.parameters;
         Self { link_v: parameters.dc_link_nominal_v, switching_hz: parameters.max_switching_hz }
     }
 
-    /// By how much shorter times are where devices switch faster.
+    /// Factor by which times are shorter if the devices switch faster.
     fn shorter(&self) -> f64 {
         (real::SWITCHING_HZ / self.switching_hz).min(1.0)
     }
 
-    /// A run's options with what `--real` stands for among them, for a machine: what is given stays.
+    /// The options of a run with a machine, with the values of `--real` filled in; values that were given stay.
     pub fn run(&self, given: &RunOptions, machine: &Machine) -> RunOptions {
         let ripple = Ripple { amplitude_v: real::RIPPLE_SHARE * self.link_v, frequency_hz: real::RIPPLE_HZ };
         RunOptions {
@@ -269,7 +269,7 @@ impl RealInverter {
         }
     }
 
-    /// The drops of devices that `--real` stands for, for a machine.
+    /// The device drops of `--real` for a machine.
     pub fn drops(&self, machine: &Machine) -> Drops {
         let volts = self.link_v / real::LINK_V;
         let ohms = volts / (machine.folder.parameters.max_current_a / real::CURRENT_A);
@@ -278,7 +278,7 @@ impl RealInverter {
     }
 }
 
-/// The offset that `--real` stands for, for a machine: beyond a twentieth of the largest current the drive refuses it.
+/// The sensor offset of `--real` for a machine: the drive refuses more than a twentieth of the largest current.
 fn real_offset(machine: &Machine) -> Phases {
     let parameters = &machine.folder.parameters;
     let share = (real::OFFSET_TRIP * parameters.max_current_a / parameters.trip_current_a).min(1.0);
@@ -286,7 +286,7 @@ fn real_offset(machine: &Machine) -> Phases {
 }
 
 impl Filled {
-    /// Of options that ask for it, for a machine: what is given stays.
+    /// Fills in options that ask for it, for a machine; values that were given stay.
     pub fn of(given: &RunOptions, beside: Beside, flaws: &FlawOptions, machine: &Machine) -> Self {
         let inverter = RealInverter::of(machine);
         let times = inverter.shorter();
@@ -351,12 +351,12 @@ impl FlawOptions {
         self.current_offset.unwrap_or_default().0.map(|percent| percent / 100.0)
     }
 
-    /// By how much the three currents are sampled early, on average, in µs.
+    /// Mean time by which the three currents are sampled early, in µs.
     pub fn mean_skew_us(&self) -> f64 {
         self.adc_skew_us.unwrap_or_default().0.iter().sum::<f64>() / 3.0
     }
 
-    /// By how much each phase's current is read larger than it is, as shares.
+    /// Excess of each phase's current reading over the true current, as shares.
     pub fn gains(&self) -> [f64; 3] {
         self.current_gains.unwrap_or_default().0.map(|percent| percent / 100.0)
     }
@@ -366,7 +366,7 @@ impl FlawOptions {
         self.adc_skew_us.unwrap_or_default().0.map(|us| 1e-6 * us)
     }
 
-    /// The deviations of the true machine and its inverter, with those that are not flaws of these options.
+    /// The deviations of the true machine and its inverter: those of these options together with the others.
     pub fn plant(&self, others: PlantSettings, rotor_kg_m2: f64) -> PlantSettings {
         let shaft = self.shaft.map(|Elastic([hz, damping])| ShaftSettings { hz, damping, rotor_kg_m2 });
         let (slots_share, iron_share) = (self.slots / 100.0, self.iron_loss / 100.0);

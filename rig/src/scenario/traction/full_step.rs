@@ -36,7 +36,7 @@ impl Scenario<Traction> for FullStep {
             analysis::step_response(recording, &step)
         });
         let mut figures = analysis::common(recording);
-        // Where pulses are few the demand has a slew limit: there is no step to judge.
+        // With few pulses the demand has a slew limit: there is no step to judge.
         let carrier = recording.rows.iter().all(|row| row.mode.is_carrier());
         if carrier {
             figures.set("verdicts", verdicts(&steps, options, machine));

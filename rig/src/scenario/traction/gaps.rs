@@ -1,5 +1,5 @@
-//! Gaps in the line, as at a section insulator: motoring, the rotor's energy holds the link until the line is back; braking, the chopper
-//! takes what the line no longer does. Behind a line filter of 3 mH, 4 mF and 30 mΩ unless another one is chosen.
+//! Gaps in the line, as at a section insulator. When motoring, the rotor's energy holds the link until the line is back; when braking, the
+//! chopper takes what the line no longer takes. The line filter is 3 mH, 4 mF and 30 mΩ unless another one is chosen.
 
 use super::line::{self, within};
 use super::prelude::*;
@@ -28,12 +28,12 @@ const GAPS: [(f64, f64, f64); 11] = [
     (3_000.0, 1.0, 0.5),
     (3_000.0, -1.0, 0.5),
 ];
-/// The first of them begins, in s; and from the beginning of each: speed reached, torque asked for, line lost.
+/// Beginning of the first gap's stretch, in s; and times from each beginning until the speed is reached, torque is demanded, the line is lost.
 const BEGIN_S: f64 = 1.3;
 const SPEED_S: f64 = 0.3;
 const TORQUE_S: f64 = 0.3;
 const GAP_S: f64 = 0.7;
-/// After a gap: the torque is back, and the next one begins.
+/// Times after a gap by which the torque is back, and at which the next stretch begins, in s.
 const BACK_S: f64 = 0.3;
 const AFTER_S: f64 = 0.5;
 /// The usual line filter at 1,500 V.
@@ -48,14 +48,14 @@ struct Gap {
     speed_rpm: f64,
     torque_share: f64,
     length_s: f64,
-    /// The line is lost, in s.
+    /// Instant at which the line is lost, in s.
     at_s: f64,
     /// The lowest and the highest link voltage until the next gap's torque.
     link_least_v: f64,
     link_peak_v: f64,
-    /// Largest braking torque while the line is away from a drive that was not to brake, in N·m.
+    /// Largest braking torque, while the line is away, of a drive that was not to brake, in N·m.
     holding_nm: f64,
-    /// From the line's return until the torque is within a tenth of the largest of what it was, in s.
+    /// Time from the line's return until the torque is back to its earlier value within a tenth of the largest torque, in s.
     back_s: f64,
     /// The mean torque afterwards over that before, less one.
     torque_error: f64,
@@ -87,7 +87,7 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
     }
 }
 
-/// The link behind the usual filter, the same times and shares of voltage and power as the reference machine's.
+/// The link behind the usual filter, with the same times and the same shares of voltage and power as the reference machine's.
 pub(super) fn link(machine: &Machine, nominal_v: f64) -> DcLinkSettings {
     let link = line::scaled(machine);
     let ohms = link.precharge_ohm / line::LINK.precharge_ohm;

@@ -13,7 +13,7 @@ use tractive::control::{ControlLaw, Demand};
 use tractive::recorder::Recorder;
 use tractive::wire::Setup;
 
-/// A run on the host, but for the control law.
+/// A run on the host, except for the control law.
 pub(super) struct OnHost<'a> {
     pub name: &'a str,
     pub bench: Bench,
@@ -24,7 +24,7 @@ pub(super) struct OnHost<'a> {
 }
 
 impl OnHost<'_> {
-    /// The drive's own tasks with a law; with other drives on the same link each its own.
+    /// The drive's own tasks with a law; other drives on the same link each have their own.
     pub fn run(
         self,
         law: impl ControlLaw + Copy,
@@ -52,7 +52,7 @@ impl OnHost<'_> {
     }
 }
 
-/// The benches of the other drives on the same line: of the same plan, but for their wheels, their rotors' angles and their noise.
+/// The benches of the other drives on the same line: of the same plan, except for their wheels, their rotors' angles and their noise.
 pub(super) fn beside(
     plan: &mut Plan,
     setup: &Setup,

@@ -38,7 +38,7 @@ const AFTER_FAULT_S: f64 = 0.1;
 pub struct Stand {
     /// Inertia of the free rotor, in kg·m².
     pub inertia_kg_m2: f64,
-    /// From this time on a current sensor reads too much by three tenths of the largest current, in s.
+    /// Time from which a current sensor reads too much by three tenths of the largest current, in s.
     pub fault_at_s: Option<f64>,
 }
 
@@ -56,7 +56,7 @@ impl Stand {
 /// Error of the sensor that fails, as a share of the machine's largest current.
 const OFFSET: f64 = 0.3;
 
-/// The check that no option asks for what the experiment is not: a law, patterns or a supply of another kind.
+/// The check that no option asks for something that the experiment does not have: another law, other patterns or another kind of supply.
 ///
 /// # Errors
 /// The first option that does.
@@ -76,7 +76,7 @@ fn check(options: &Options) -> Result<()> {
     }
 }
 
-/// Drives the experiment until it is over or a fault ends it. Nothing compensates the dead time, whatever the options say: the fit counts
+/// Drives the experiment until it is over or a fault ends it. The dead time is not compensated, whatever the options say: the fit uses
 /// the pulses as they are commanded.
 ///
 /// # Errors
@@ -107,7 +107,7 @@ pub fn drive(options: &Options, machine: &Machine, stand: &Stand) -> Result<Reco
     }
 }
 
-/// Drives the experiment as a board is driven: from an empty link, commanded over the protocol, whose frames carry off what was observed.
+/// Drives the experiment like a board: from an empty link, commanded over the protocol, whose frames carry away the observations.
 ///
 /// # Errors
 /// As [`drive`], and those of the supervisor.
@@ -119,7 +119,7 @@ pub fn drive_commanded(
 ) -> Result<Recording> {
     let options = &held(options)?;
     let idle = operator::Request::idle(&machine.tables.ratings);
-    // The frames ask, not this.
+    // The requests come in frames, not from here.
     let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
     let plan = Plan {
         speed: stand.rotor(),
@@ -147,7 +147,7 @@ pub fn drive_commanded(
     }
 }
 
-/// The options that hold: nothing compensates the dead time, and the carrier is free.
+/// The options that apply: the dead time is not compensated, and the carrier is free.
 fn held(options: &Options) -> Result<Options> {
     drives::alone(options.own.drives)?;
     check(options)?;

@@ -28,7 +28,7 @@ pub const LINK: DcLinkSettings = DcLinkSettings {
 /// Largest power of the drive that these parts are for, in W.
 const POWER_W: f64 = 246.4e3;
 
-/// True of a time that lies in one of some windows (from, until).
+/// True if a time lies in one of the windows (from, until).
 pub fn within(windows: &[(f64, f64)], t_s: f64) -> bool {
     windows.iter().any(|(from, until)| (from - 1e-9..until - 1e-9).contains(&t_s))
 }
@@ -49,7 +49,7 @@ pub fn states(recording: &Recording) -> Vec<Entered> {
     let mut entered: Vec<Entered> = Vec::new();
     for SlotRow { t_s, status } in &recording.slots {
         let (state, fault) = (status.state.name(), status.trip.map_or("", |trip| trip.fault.name()));
-        // Whether there is torque is no state of its own here.
+        // Having torque or not is no state of its own here.
         if entered.last().is_none_or(|last| last.state != state) {
             entered.push(Entered { at_s: *t_s, state, fault });
         }
@@ -97,7 +97,7 @@ pub fn verdicts(recording: &Recording, expected_refusals: &[&str]) -> Vec<Verdic
     ]
 }
 
-/// Gates that were switched on in a state without pulses; in the slot after one with pulses the last of them end.
+/// Gates that were switched on in a state without pulses; the last pulses may end in the slot after a state that has them.
 fn stray_edges(recording: &Recording) -> usize {
     let pulsing =
         |state: State| matches!(state, State::Enabled | State::Running | State::Stopping | State::Coasting);
@@ -106,14 +106,14 @@ fn stray_edges(recording: &Recording) -> usize {
     on.filter(|edge| {
         let t_s = recording.seconds(edge.tick);
         let after = slots.partition_point(|slot| slot.t_s <= t_s);
-        // Two slots: the permit is seen in the next control period, and the half that is committed is played.
+        // Two slots: the permit is seen in the next control period, and the committed half is still played.
         let recent = &slots[after.saturating_sub(3)..after];
         !recent.iter().any(|slot| pulsing(slot.status.state))
     })
     .count()
 }
 
-/// Energy that the link has got and neither given nor kept, over what was moved.
+/// Energy that the link received and neither passed on nor kept, as a share of the energy moved.
 fn unaccounted(recording: &Recording) -> f64 {
     let Some(balance) = recording.link else { return f64::NAN };
     balance.missing_j.abs() / balance.moved_j.max(1.0)
@@ -158,7 +158,7 @@ fn switched(on: Option<bool>) -> f64 {
     f64::from(u8::from(on.unwrap_or(false)))
 }
 
-/// The line side's link for a machine: the same shares of its voltage and power as the reference machine has.
+/// The line side's link for a machine, with the same shares of its voltage and power as the reference machine has.
 pub fn scaled(machine: &Machine) -> DcLinkSettings {
     let parameters = &machine.folder.parameters;
     let volts = parameters.dc_link_nominal_v / LINK.source.voltage_v;

@@ -1,5 +1,5 @@
-//! Limits of line current and line power: from standstill to two thirds of the largest speed with full torque, and back. Motoring, the line's
-//! current is limited, braking, its power. Behind a line filter of 3 mH, 4 mF and 30 mΩ unless another one is chosen.
+//! Limits of line current and line power: from standstill to two thirds of the largest speed with full torque, and back. The line's current
+//! is limited when motoring, its power when braking. The line filter is 3 mH, 4 mF and 30 mΩ unless another one is chosen.
 
 use super::gaps;
 use super::line;
@@ -15,22 +15,22 @@ use tractive::operator::{Request, TrainLimits};
 /// See the module.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct LineLimits {
-    /// Largest line current while motoring, in A; without it that of 60 % of the largest power at the nominal voltage.
+    /// Largest line current while motoring, in A; default the current of 60 % of the largest power at the nominal voltage.
     #[arg(long, value_parser = positive, allow_negative_numbers = true, value_name = "A")]
     line_current: Option<f64>,
-    /// Largest line power while braking, in kW; without it half of the largest power.
+    /// Largest line power while braking, in kW; default half of the largest power.
     #[arg(long, value_parser = positive, allow_negative_numbers = true, value_name = "KW")]
     line_power: Option<f64>,
 }
 
-/// Full torque from and until; the speed rises and falls within, in s.
+/// Times of full torque, motoring and braking, and of the speed's rise and fall within them, in s.
 const MOTORS: (f64, f64) = (1.3, 4.9);
 const BRAKES: (f64, f64) = (5.4, 9.0);
 const RISES: (f64, f64) = (1.7, 4.5);
 const FALLS: (f64, f64) = (5.6, 8.6);
 const DURATION_S: f64 = 9.4;
 const FAST_RPM: f64 = 4_000.0;
-/// Time over which the line's current is the mean, in s: more than a turn of the slowest filter's swing.
+/// Time over which the line's current is averaged, in s: more than a period of the slowest filter's oscillation.
 const MEAN_S: f64 = 0.05;
 
 impl LineLimits {
@@ -72,14 +72,14 @@ fn largest(recording: &Recording, (from, until): (f64, f64), of: impl Fn(&Row) -
     worst(means).unwrap_or(f64::NAN)
 }
 
-/// Share of the line's current that is allowed at the source's voltage while motoring.
+/// Share of the line current's limit that is allowed at the source's voltage while motoring.
 fn sagged(source_v: f64, machine: &Machine) -> f64 {
     let parameters = &machine.folder.parameters;
     let (full_v, none_v) = (0.9 * parameters.dc_link_nominal_v, parameters.dc_link_min_v);
     ((source_v - none_v) / (full_v - none_v)).clamp(0.0, 1.0)
 }
 
-/// The largest power that full braking returns to the line, in W: that of the shaft, less what the largest current takes of it.
+/// The largest power that full braking returns to the line, in W: the shaft's power less the copper loss of the largest current.
 fn most_returned_w(machine: &Machine) -> f64 {
     let (parameters, fast) = (&machine.folder.parameters, scaled_rpm(FAST_RPM, machine));
     let copper_w = 1.5 * parameters.stator_resistance_ohm * parameters.max_current_a.powi(2);
@@ -107,7 +107,7 @@ impl Scenario<Traction> for LineLimits {
         let taken = largest(recording, MOTORS, line_a) / allowed_a;
         let given = largest(recording, BRAKES, |row| -line_a(row) * row.udc_v) / f64::from(train.braking_w);
         let rises_nm = largest(recording, (MOTORS.0, RISES.0), |row| row.te_nm);
-        // Where the copper takes much of the braking power its limit is out of reach.
+        // If the copper takes much of the braking power, its limit is out of reach.
         let reached = (most_returned_w(machine) / f64::from(train.braking_w)).min(1.0);
         let most = bound(options, 1.02, 1.05);
         let mut verdicts = line::verdicts(recording, &[]);

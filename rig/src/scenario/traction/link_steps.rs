@@ -12,7 +12,7 @@ pub struct LinkSteps;
 const SPEEDS_RPM: [f64; 5] = [300.0, 1000.0, 1500.0, 1800.0, 3000.0];
 const SETTLE_S: f64 = 0.5;
 const HOLD_S: f64 = 0.15;
-/// Of a nominal voltage of 1,500 V.
+/// Step for a nominal voltage of 1,500 V.
 const STEP_V: f64 = 200.0;
 const SHARES: [f64; 4] = [-1.0, 0.0, 1.0, 0.0];
 const SLOT_S: f64 = SETTLE_S + SHARES.len() as f64 * HOLD_S;

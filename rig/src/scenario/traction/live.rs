@@ -1,4 +1,4 @@
-//! A drive that somebody drives by hand, as long as he likes: plant, contactors, operator and drive as in every scenario, stepped from outside.
+//! A drive that somebody drives by hand for as long as he likes: plant, contactors, operator and drive as in every scenario, stepped from outside.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub use crate::scenario::live::{Command, Start, Turning, Wanted};
@@ -26,9 +26,9 @@ use tractive::protection::Trip;
 const HELD_SLOPE_RPM_S: f64 = 2_000.0;
 /// Slope at which the speed loop's reference goes to another speed, in r/min per s.
 const LOOP_SLOPE_RPM_S: f64 = 500.0;
-/// The acceleration of a rotor that runs away, in r/min per s, and its last speed as a share of the trip level.
+/// The acceleration of a rotor that runs away, in r/min per s, and its final speed as a share of the trip level.
 const RUNAWAY: (f64, f64) = (12_000.0, 1.2);
-/// Length of the bench's first recording, in s: it has no end, but makes room for so many rows.
+/// Length of the bench's first recording, in s: the recording is endless, but reserves room for that many rows.
 const ROOM_S: f64 = 0.1;
 /// Resistance of a line that is cut off, in ohm.
 const CUT_OFF_OHM: f64 = 1e9;
@@ -40,7 +40,7 @@ pub struct Live {
     request: Arc<Mutex<Request>>,
     /// The present wishes.
     pub wanted: Wanted,
-    /// Time until which the acknowledge stands, in s.
+    /// Time until which the acknowledge is set, in s.
     acknowledged_until_s: f64,
     command: Command,
     speed_loop: SpeedLoop,
@@ -55,7 +55,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Switched on with the options of any run; the link stands at its voltage, its contactors open.
+    /// Switches a drive on with the options of any run; the link is at its voltage, with its contactors open.
     ///
     /// # Errors
     /// Names the option that is out of its range.
@@ -93,7 +93,7 @@ impl Live {
         })
     }
 
-    /// Lets so much time pass, in s.
+    /// Lets a time in s pass.
     ///
     /// # Errors
     /// Says why the bench cannot go on.
@@ -208,13 +208,13 @@ impl Live {
     fn begin_loop(&mut self) {
         let inertia_kg_m2 = match self.turning {
             Turning::Free(inertia_kg_m2, _) => inertia_kg_m2,
-            // Nothing that the loop does moves a rotor that is held.
+            // The loop cannot move a rotor that is held.
             Turning::Held(_) => 1.0,
         };
         self.speed_loop = SpeedLoop::new(inertia_kg_m2, self.largest_nm, self.speed_rpm(), 0.0);
     }
 
-    /// Once a slot: the line's voltage, and the request.
+    /// Sets the line's voltage and the request, once a slot.
     fn turn(&mut self) {
         self.feed();
         let torque_nm = match self.command {

@@ -60,11 +60,11 @@ impl Scenario<Traction> for LoadSteps {
     }
 }
 
-/// Bounds of every step. Of a drive with flaws it is the final mean alone: what noise and ripple do to the torque is no
+/// Bounds of every step. With flaws only the final mean is judged: the effect of noise and ripple on the torque is no
 /// part of the step.
 pub fn verdicts(steps: &[StepResponse], options: &RunOptions, machine: &Machine) -> Vec<Verdict> {
     let most = |value: fn(&StepResponse) -> f64| worst(steps.iter().map(value));
-    // 0.3 % of the command (1.5 % with flaws) or 0.16 % of the largest torque, whichever is more, counts as one.
+    // An error of one is 0.3 % of the command (1.5 % with flaws) or 0.16 % of the largest torque, whichever is more.
     let percent = bound(options, 0.3, 1.5);
     let least_nm = scaled_nm(2.0, machine);
     let error = |step: &StepResponse| step.final_error_nm.abs() / (0.01 * percent * step.to_nm).max(least_nm);

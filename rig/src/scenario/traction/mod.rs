@@ -85,11 +85,11 @@ impl System for Traction {
         let shortest_half_us = 0.5e6 / parameters.max_switching_hz;
         let fastest_rad_s =
             parameters.max_speed_rpm * std::f64::consts::PI / 30.0 * f64::from(parameters.pole_pairs);
-        // A drive that knows the filter takes it for a delay.
+        // A drive that knows the filter treats it as a delay.
         let most_known_us = shortest_half_us.min(0.3e6 / fastest_rad_s);
         let own = |name: &str| scenario.get(name).and_then(Value::as_f64).unwrap_or(0.0);
         let (switching_hz, control_hz) = (parameters.max_switching_hz, control_hz(options, machine));
-        // A carrier lasts a control period at least.
+        // A carrier lasts at least a control period.
         ensure!(
             (50.0..=f64::from(control_hz)).contains(&switching_hz),
             "max_switching_hz {switching_hz}: must be from 50 to {control_hz}, the rate of control: --control-hz {:.0} goes with it",

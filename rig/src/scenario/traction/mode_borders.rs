@@ -1,4 +1,4 @@
-//! Mode borders crossed at constant speed, by torque alone.
+//! Mode borders crossed at constant speed, by a change of torque alone.
 
 use super::prelude::*;
 use super::scaled::scaled_rpm;
@@ -14,14 +14,14 @@ pub struct ModeBorders {
     speed: Option<f64>,
 }
 
-/// Speeds at which torque alone leads from 7 to 3 pulses and back, and at which it leads from 7 by 3 into square wave and out of it.
+/// Speeds at which torque alone leads from 7 to 3 pulses and back, and from 7 through 3 pulses into square wave and out of it.
 const SPEEDS_RPM: [f64; 2] = [1750.0, 1888.0];
 const LEVELS: usize = 800;
-/// So slow that the envelopes beside a switch, 100 ms away, are those of its torque within a percent.
+/// Time at each level, in s: so long that the envelopes beside a switch, 100 ms away, match those of its torque within a percent.
 const LEVEL_S: f64 = 0.01;
-/// At the envelope, in s.
+/// Time at the envelope, in s.
 const HOLD_S: f64 = 0.6;
-/// Up, hold, down, and a little without torque, in s; and from one speed to the next.
+/// Time for up, hold, down and a little without torque, and time from one speed to the next, in s.
 const SLOT_S: f64 = 2.0 * LEVELS as f64 * LEVEL_S + HOLD_S + 0.2;
 const RAMP_S: f64 = 0.3;
 

@@ -18,7 +18,7 @@ use tractive_tablegen::Patterns;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StartName {
-    /// That of the operating point before
+    /// The operating point before
     Previous,
     /// No current, as we read the paper
     Zero,
@@ -84,68 +84,68 @@ pub struct TractionOptions {
     /// With --law pi: the point whose inductances the first of the two passes of MTPA takes.
     #[arg(long, value_enum, default_value = "previous", value_name = "POINT")]
     pub mtpa_start: StartName,
-    /// The pulse patterns above the free carrier; without it those that machine.toml names, else the paper's.
+    /// The pulse patterns above the free carrier; default those that machine.toml names, else the paper's.
     #[arg(long, value_enum)]
     pub patterns: Option<PatternsName>,
-    /// A part of the project's own law to take away, to see what it buys; on the host.
+    /// A part of the project's own law to take away, to show its benefit; on the host.
     #[arg(long, value_enum, value_name = "PART")]
     pub ablate: Option<Part>,
-    /// Leave the dead time uncompensated: neither the pulses are corrected nor is the sixth harmonic of the voltage followed.
+    /// Leave the dead time uncompensated: the pulses are not corrected, and the sixth harmonic of the voltage is not followed.
     #[arg(long)]
     pub uncompensated: bool,
-    /// Rate of the control interrupt, in Hz; without it 10,000, or 20,000 for a machine whose devices switch faster than 10 kHz.
+    /// Rate of the control interrupt, in Hz; default 10,000, or 20,000 for a machine whose devices switch faster than 10 kHz.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1_000..=100_000))]
     pub control_hz: Option<u32>,
     /// Line filter between a stiff source and the link: choke, link capacitor and the resistance of both, written L_MH,C_MF,R_MOHM;
     /// without it the link itself is stiff.
     #[arg(long, value_name = "L_MH,C_MF,R_MOHM", allow_negative_numbers = true)]
     pub line: Option<LineFilter>,
-    /// Drives behind that line filter: the same ones with the same demand, each further one's wheels larger by a percent, so that its speed is lower.
+    /// Drives behind that line filter: all alike with the same demand, but each further one has wheels larger by a percent, so a lower speed.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4), value_name = "NUMBER")]
     pub drives: u32,
-    /// Error of the angle sensor that goes once with the electrical angle, amplitude in electrical degrees.
+    /// Error of the angle sensor that occurs once per electrical turn, amplitude in electrical degrees.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
     pub angle_1f_deg: f64,
-    /// The same that goes twice with it.
+    /// Error of the angle sensor that occurs twice per electrical turn, amplitude in electrical degrees.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "DEG")]
     pub angle_2f_deg: f64,
     /// Age of the angle when it is read, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
     pub angle_late_us: f64,
-    /// Lines of the position encoder in a turn of the shaft, four counts each; without it the angle has no steps.
+    /// Lines of the position encoder per turn of the shaft, four counts each; without it the angle has no steps.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "LINES")]
     pub encoder_lines: Option<u32>,
     /// Time constant of the current sensors, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "US")]
     pub current_filter_us: f64,
-    /// The drive knows of --angle-late-us and of the mean of --angle-jitter-us, as by its power stage's key, and makes up for them.
+    /// The drive knows --angle-late-us and the mean of --angle-jitter-us, as from its power stage's key, and compensates for them.
     #[arg(long)]
     pub angle_late_known: bool,
-    /// The drive knows of --current-filter-us and of the mean of --adc-skew-us, as by its power stage's key, and makes up for them.
+    /// The drive knows --current-filter-us and the mean of --adc-skew-us, as from its power stage's key, and compensates for them.
     #[arg(long)]
     pub current_filter_known: bool,
-    /// The drive knows of --iron-loss, as by its machine's key, and makes up for it, up to 100 %; --law pi does not.
+    /// The drive knows --iron-loss, as from its machine's key, and compensates for it, up to 100 %; --law pi does not.
     #[arg(long)]
     pub iron_loss_known: bool,
-    /// The true machine, where it is not the one that control knows: a folder of tables/, or the path of any machine folder.
+    /// The true machine, if it differs from the one that control knows: a folder of tables/, or the path of any machine folder.
     #[arg(long, value_name = "DIR")]
     pub plant: Option<String>,
-    /// By how much currents are read larger than they are, in percent.
+    /// Excess of the current readings over the true currents, in percent.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
     pub current_gain: f64,
-    /// By how much the DC link is read larger than it is, in percent.
+    /// Excess of the DC link's reading over its true voltage, in percent.
     #[arg(long, default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, value_name = "PERCENT")]
     pub udc_gain: f64,
-    /// The phase that each of the three current sensors reads, with - where its leads are exchanged.
+    /// The phase that each of the three current sensors reads, with - if its leads are exchanged.
     #[arg(long, default_value_t, allow_hyphen_values = true, value_name = "U,V,W")]
     pub current_sensors: Wiring,
     /// The angle sensor counts the wrong way.
     #[arg(long)]
     pub angle_reversed: bool,
-    /// Torque of friction of a free rotor against either direction, in N·m.
+    /// Friction torque of a free rotor in either direction, in N·m.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, value_name = "NM")]
     pub friction: f64,
-    /// By how much the PWM timer starts later, in µs.
+    /// Time by which the PWM timer starts later, in µs.
     #[arg(long, default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true, hide = true)]
     pub pwm_delay_us: f64,
     /// Further flaws.
@@ -161,7 +161,7 @@ impl TractionOptions {
         if self.angle_late_known { (1e-6 * mean_us) as f32 } else { 0.0 }
     }
 
-    /// Delay of the currents that the drive is told, in ticks: the sensors' time constant, and by how much all phases together are sampled early.
+    /// Delay of the currents that the drive is told, in ticks: the sensors' time constant and the mean time by which the phases are sampled early.
     pub(super) fn known_filter_ticks(&self) -> u32 {
         if self.current_filter_known { ticks(self.current_filter_us + self.flaws.mean_skew_us()) } else { 0 }
     }

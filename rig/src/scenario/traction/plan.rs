@@ -33,15 +33,15 @@ pub struct Plan {
     pub train: TrainLimits,
     /// The fault, if there is one.
     pub injection: Option<Injection<Kind>>,
-    /// From this time on control is told the same currents again and again, in s.
+    /// Time from which control is given the same currents again and again, in s.
     pub freeze_at_s: Option<f64>,
-    /// The incremental encoder that the rotor has in the place of an absolute one.
+    /// The incremental encoder that the rotor has instead of an absolute one.
     pub encoder: Option<Encoder>,
 }
 
 impl Plan {
-    /// For a drive that is commanded directly at a prescribed speed: (time in s, r/min), straight lines between; before the first the
-    /// first.
+    /// A plan for a drive that is commanded directly at a prescribed speed: (time in s, r/min), straight lines between the points; before the
+    /// first point its speed holds.
     pub fn driven(
         lead_s: f64,
         duration_s: f64,
@@ -64,8 +64,8 @@ impl Plan {
         }
     }
 
-    /// The same with a line filter in front of the link's contactors, where the scenario has them: precharge and discharge of its capacitor take as long as
-    /// before.
+    /// The same with a line filter in front of the link's contactors, if the scenario has them: precharge and discharge of its capacitor take
+    /// as long as before.
     pub(super) fn behind(mut self, filter: Option<LineFilter>) -> Self {
         if let (Some(line), Some(filter)) = (&mut self.line, filter) {
             let LineFilter { inductance_h, resistance_ohm, capacitance_f } = filter;
@@ -80,7 +80,7 @@ impl Plan {
 
     /// For a drive with a line side, whose operator permits what is driven.
     pub fn operated(duration_s: f64, speed: Vec<(f64, f64)>, line: LinePlan) -> Self {
-        // What the operator permits takes the place of this.
+        // Replaced by what the operator permits.
         let nothing = |_: f64| (Demand::default(), true);
         Self { line: Some(line), ..Self::driven(0.0, duration_s, speed, nothing) }
     }

@@ -1,4 +1,4 @@
-//! From power-up to running and back to an empty link, by command, with commands on the way that are refused.
+//! From power-up to running and back to an empty link, by command; some commands on the way are refused.
 
 use super::line::{self, within};
 use super::prelude::*;
@@ -15,7 +15,7 @@ use tractive::operator::{Line, Request, State};
 pub struct Precharge;
 
 const DURATION_S: f64 = 7.0;
-/// Times at which each command stands; refusals are said beside them.
+/// Times during which each command is set; refusals are noted beside them.
 const ENABLE: [(f64, f64); 4] = [
     (0.1, 0.15), /* link_not_charged */
     (0.5, 0.55), /* again */
@@ -34,7 +34,7 @@ const REFUSALS: [&str; 6] = [
     "not_stopped",
     "machine_turning",
 ];
-/// The last refusal of a machine whose EMF leaves the link empty: its link is discharged at the first word, and the second is too many.
+/// The last refusal on a machine whose EMF leaves the link empty: the first command already discharges its link, the second is refused.
 const LAST_OF_WEAK: &str = "discharging";
 /// Share of the largest torque that is demanded from these times on.
 const TORQUE: [(f64, f64); 4] = [(1.75, 0.01), (1.9, 0.0), (2.1, 0.65), (3.6, 0.0)];

@@ -10,11 +10,11 @@ use crate::analysis::FlyingStart;
 pub struct Restart;
 
 const SPEEDS_RPM: [f64; 9] = [0.0, 300.0, 800.0, 1050.0, 1500.0, 2000.0, 3000.0, 4500.0, 6000.0];
-/// Coasting: as the speed changes, and at the new one.
+/// Times of coasting while the speed changes, and at the new speed, in s.
 const RAMP_S: f64 = 0.1;
 const HOLD_S: f64 = 0.15;
 const DRIVE_S: f64 = 0.25;
-/// Without torque before coasting, in s.
+/// Time without torque before coasting, in s.
 const RELEASE_S: f64 = 0.06;
 
 /// Times of the slots.
@@ -87,7 +87,7 @@ impl Scenario<Traction> for Restart {
 
 fn verdicts(catches: &[FlyingStart], options: &RunOptions) -> Vec<Verdict> {
     let other_mode = catches.iter().filter(|catch| catch.first_mode != catch.then_mode).count();
-    // Coasting fast, the diodes' current may be beyond the largest.
+    // When the machine coasts fast, the diodes' current may exceed the largest current.
     let over = |catch: &FlyingStart| {
         let allowed_a = (catch.catching_current_a / catch.share_of_largest).max(catch.coasting_current_a);
         if catch.catching_current_a > 0.0 { catch.catching_current_a / allowed_a } else { 0.0 }

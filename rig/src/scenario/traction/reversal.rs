@@ -5,7 +5,7 @@ use super::scaled::scaled_rpm;
 use super::script::{BEGIN_S, Script};
 use crate::spectrum;
 
-/// At `--speed`: full power, full braking power, nothing, full power; each for 0.4 s, in steps.
+/// At `--speed`: full power, full braking power, no power, full power; each for 0.4 s, in steps.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Reversal {
     /// Speed, in r/min.
@@ -19,7 +19,7 @@ const SHARES: [f64; 4] = [1.0, -1.0, 0.0, 1.0];
 
 impl Scenario<Traction> for Reversal {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
-        // The envelope makes full power of full torque.
+        // The envelope turns full torque into full power.
         let most = machine.folder.parameters.max_torque_nm;
         let torque = SHARES.iter().enumerate().map(|(k, share)| (BEGIN_S + k as f64 * HOLD_S, share * most));
         Script {

@@ -1,4 +1,4 @@
-//! A run written down as what happens when.
+//! A run written as a list of events and their times.
 
 use super::plan::{LEAD_S, Plan};
 use crate::steps::held;

@@ -1,4 +1,4 @@
-//! The drive under test: what it is told, and its tasks.
+//! The drive under test: its settings, and its tasks.
 
 use super::{Options, PatternsName, Plan};
 use crate::bench::LinePlan;

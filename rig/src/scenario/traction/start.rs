@@ -1,5 +1,5 @@
-//! A start without an angle: the encoder has seen no index since it was switched on, the rotor stands anywhere, and the drive finds out
-//! where before it gives torque.
+//! A start without an angle: the encoder has seen no index since it was switched on, the rotor may stand anywhere, and the drive finds the
+//! angle before it gives torque.
 
 use super::line::{self, within};
 use super::prelude::*;
@@ -16,7 +16,7 @@ use tractive::start_up::{PUSH_GROWTH_HZ, PUSHED};
 /// See the module.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Start {
-    /// The rotor's place behind its index, mechanical, in degrees.
+    /// Position of the rotor behind its index, mechanical, in degrees.
     #[arg(long, value_name = "DEG", default_value_t = 77.0, value_parser = turn, allow_negative_numbers = true)]
     from_deg: f64,
     /// The brake holds the rotor.
@@ -31,21 +31,21 @@ fn turn(text: &str) -> Result<f64, String> {
 
 const CHARGE: (f64, f64) = (0.1, 0.2);
 const ENABLE_S: f64 = 0.3;
-/// Torque is demanded from here on, of a machine whose pushes last no longer than usual; and for how long.
+/// Beginning of the torque demand, for a machine whose pushes last no longer than usual, and its length, in s.
 const TORQUE_S: (f64, f64) = (0.8, 0.3);
-/// Largest share of the largest torque, and of the largest speed that a light rotor is taken to by less.
+/// Share of the largest torque at most; a light rotor gets less, which takes it to this share of the largest speed.
 const TORQUE_SHARE: f64 = 0.2;
 const SPEED_SHARE: f64 = 0.5;
-/// The torque is judged from so long after it is demanded, and until so long before it ends.
+/// Time after the demand begins from which the torque is judged, and time before its end until which it is judged, in s.
 const JUDGED_S: (f64, f64) = (0.15, 0.01);
-/// The time that torque takes from an angle that is found later on.
+/// Time that torque takes to come if the angle is found later, in s.
 const COMES_S: f64 = 0.05;
 const REST_S: f64 = 0.1;
-/// Lengths of a push in which the polarity is found, with the brake after it, and the time that is there for them anyway.
+/// Push lengths that finding the polarity takes, with the braking after them, and the time that is available for them anyway, in s.
 const PUSHES: f64 = 5.0;
 const USUAL_PUSHES_S: f64 = 0.2;
 
-/// The torque's course: from when until when in s, and how much of the largest it is.
+/// The torque's course: its beginning and end in s, and its share of the largest torque.
 struct Torque {
     from_s: f64,
     until_s: f64,
@@ -74,7 +74,7 @@ impl Torque {
     }
 }
 
-/// Farthest turn backward of the rotor, mechanical, in degrees.
+/// Largest backward turn of the rotor, mechanical, in degrees.
 fn backward_deg(recording: &Recording) -> f64 {
     let turned = recording.rows.windows(2).scan(0.0, |turned, rows| {
         *turned += 6.0 * 0.5 * (rows[0].speed_rpm + rows[1].speed_rpm) * (rows[1].t_s - rows[0].t_s);

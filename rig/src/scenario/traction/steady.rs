@@ -1,4 +1,4 @@
-//! One operating point in steady state: distortion and torque ripple beside what the pulses allow.
+//! One operating point in steady state: distortion and torque ripple compared with what the pulses allow.
 
 use super::TractionOptions;
 use super::prelude::*;
@@ -22,9 +22,9 @@ pub struct Steady {
 const SPEED_RPM: f64 = 1000.0;
 /// Speed in r/min and torque in N·m at which the harmonics of the dead time are judged.
 const DEAD_TIME_POINT: (f64, f64) = (200.0, 100.0);
-/// The pulses' edges fall where they like between the samples: coarser ones would show more or less ripple than there is.
+/// Step, in s. Pulse edges fall anywhere between the samples: a coarser step would show more or less ripple than there is.
 const STEP_S: f64 = 5e-6;
-/// Share of the rated speed from which the torque that the drive tells is judged.
+/// Lowest speed at which the torque reported by the drive is judged, as a share of the rated speed.
 const TOLD_FROM: f64 = 0.05;
 const SETTLE_S: f64 = 0.6;
 const MEASURE_S: f64 = 0.5;
@@ -98,7 +98,7 @@ impl Steady {
         (self.speed.unwrap_or(scaled_rpm(SPEED_RPM, machine)), torque_nm)
     }
 
-    /// The same on the host with nothing that compensates the dead time.
+    /// The same on the host without any compensation of the dead time.
     fn without_compensation(
         &self,
         window: (f64, f64),
@@ -112,7 +112,7 @@ impl Steady {
     }
 }
 
-/// The dead time's harmonics, as far as they are left.
+/// The remaining harmonics of the dead time.
 fn dead_time_verdicts(measured: &Distortion, at_most: f64, how: &str) -> [Verdict; 2] {
     [5, 7].map(|order| {
         let share = measured.share_percent(order);

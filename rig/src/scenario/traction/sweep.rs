@@ -77,7 +77,7 @@ impl Scenario<Traction> for Sweep {
     }
 
     fn plots(&self, recording: &Recording, options: &Options, machine: &Machine, page: &mut Page) {
-        // The paper's figure is of the changes alone.
+        // The paper's figure shows the mode changes alone.
         page.answers(None);
         page.overview(recording);
         page.rotor_currents(recording);
@@ -96,7 +96,7 @@ impl Scenario<Traction> for Sweep {
 }
 
 impl Sweep {
-    /// Bounds where the flux map is wrong: little more current than with the right one, and the drive notices.
+    /// Bounds for a wrong flux map: the current is little larger than with the right one, and the drive notices the error.
     fn map_verdicts(&self, recording: &Recording, options: &Options, machine: &Machine) -> [Verdict; 2] {
         let run = RunOptions { on: On::Host, map_error: 0.0, ..options.run.clone() };
         let right = Options { run, own: options.own.clone() };

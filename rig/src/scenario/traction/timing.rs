@@ -1,5 +1,5 @@
-//! A short drive through every mode and up to the highest speed, for `cargo xtask timing`: every instruction of the
-//! interrupts is logged there, so a second of it takes the emulator ten.
+//! A short drive through every mode and up to the highest speed, for `cargo xtask timing`, which logs every instruction of the
+//! interrupts: the emulator takes ten seconds for a second of the run.
 
 use super::line;
 use super::prelude::*;
@@ -24,16 +24,16 @@ pub struct Timing {
     /// Last speed, in r/min; default the machine's rated one.
     #[arg(long, value_parser = finite, allow_negative_numbers = true)]
     to: Option<f64>,
-    /// The demand is not finite from this time on, in s.
+    /// Time from which the demand is not finite, in s.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     fault_at: Option<f64>,
-    /// Control is told the same currents again and again from this time on, in s.
+    /// Time from which control is given the same currents again and again, in s.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     freeze_at: Option<f64>,
-    /// A current sensor reads too much from this time on, in s.
+    /// Time from which a current sensor reads too much, in s.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     offset_at: Option<f64>,
-    /// The operator commands the drive, and the speeds come later by what that takes.
+    /// The operator commands the drive, and the speeds come later by the time that this takes.
     #[arg(long)]
     operated: bool,
 }
@@ -41,14 +41,14 @@ pub struct Timing {
 /// Speeds where async, sync 15, sync 12, middle 7, middle 3 and square are used, in r/min.
 const SPEEDS_RPM: [f64; 6] = [150.0, 750.0, 1000.0, 1450.0, 1800.0, 2200.0];
 const TO_RPM: f64 = 2000.0;
-/// From one speed to the next, to the last one, and at each, in s. A quicker ramp would count as a lost angle.
+/// Times from one speed to the next, to the last one, and at each speed, in s. A quicker ramp would count as a lost angle.
 const RAMP_S: f64 = 0.03;
 const LAST_RAMP_S: f64 = 0.16;
 const HOLD_S: f64 = 0.03;
-/// Rest of the run behind the fault, in s.
+/// Rest of the run after the fault, in s.
 const AFTER_FAULT_S: f64 = 0.005;
 const LEAD_S: f64 = 0.01;
-/// Offset that `--offset-at` adds to a phase current, as a share of the largest: more than the sum of the phases may be.
+/// Offset that `--offset-at` adds to a phase current, as a share of the largest: more than the phases' sum is allowed to be.
 const OFFSET: f64 = 0.2;
 
 /// Times at which the operator charges, enables and wants all the torque, in s, and at which the speeds begin.

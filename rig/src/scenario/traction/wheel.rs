@@ -1,4 +1,4 @@
-//! A wheel that loses its grip for a while, motoring and braking: torque is reduced and comes back, and no fault.
+//! A wheel that loses its grip for a while, motoring and braking: torque is reduced and comes back, without a fault.
 
 use super::line;
 use super::prelude::*;
@@ -13,24 +13,24 @@ use tractive::operator::{Request, TrainLimits};
 /// See the module.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Wheel {
-    /// Acceleration limit, in r/min per s; without it twice what the train does at 70 % of the largest torque; 1e9: none.
+    /// Acceleration limit, in r/min per s; default twice the train's acceleration at 70 % of the largest torque; 1e9: none.
     #[arg(long, value_parser = positive, allow_negative_numbers = true, value_name = "RPM_S")]
     acceleration_limit: Option<f64>,
 }
 
-/// Motoring and braking, in s, with this share of the largest torque.
+/// Times of motoring and braking, in s, and their share of the largest torque.
 const MOTORS: (f64, f64) = (1.3, 4.0);
 const BRAKES: (f64, f64) = (4.4, 7.1);
 const SHARE: f64 = 0.7;
-/// The rail is bad, in s, with this share of the dry rail's grip.
+/// Times of bad rail, in s, and its share of the dry rail's grip.
 const BAD: [(f64, f64); 2] = [(1.8, 2.3), (4.9, 5.4)];
 const BAD_SHARE: f64 = 0.15;
-/// Grip of a dry rail over the largest torque.
+/// Ratio of a dry rail's grip to the largest torque.
 const DRY: f64 = 1.4;
-/// Time in which all torque is to be back on the dry rail, in s.
+/// Time within which all torque has to be back on the dry rail, in s.
 const BACK_S: f64 = 1.5;
 const DURATION_S: f64 = 7.4;
-/// Speed at the beginning, in r/min, and the time in which the largest torque would bring the rotor there alone, and the train, in s.
+/// Speed at the beginning, in r/min, and times in which the largest torque would bring the rotor alone, and the train, to it, in s.
 const BEGINS_RPM: f64 = 1_000.0;
 const ROTOR_S: f64 = 0.3;
 const TRAIN_S: f64 = 8.0;
@@ -77,13 +77,13 @@ fn request(t_s: f64, ratings: &Ratings) -> Request {
 #[derive(Clone, Debug, Serialize)]
 struct Stretch {
     at_s: f64,
-    /// Largest change of speed within [`RISE_S`] while the rail is bad, over the speed before.
+    /// Largest change of speed within [`RISE_S`] while the rail is bad, relative to the speed before.
     rise_share: f64,
-    /// Largest distance of the wheel's speed from the train's before, over that.
+    /// Largest difference between the wheel's speed and the train's speed before, relative to the latter.
     slip_share: f64,
-    /// Least torque, as a share of that before.
+    /// Least torque, as a share of the torque before.
     least_share: f64,
-    /// Torque [`BACK_S`] after the rail is dry, as a share of that before.
+    /// Torque [`BACK_S`] after the rail is dry, as a share of the torque before.
     back_share: f64,
 }
 

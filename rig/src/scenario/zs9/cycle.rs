@@ -5,10 +5,10 @@ use crate::options::number;
 use crate::scenario::{System, drive};
 use clap::ValueEnum;
 
-/// From near standstill to the rated speed at full torque, the paper's from 10 to 1,300 r/min, a cruise there, and back.
+/// From near standstill to the rated speed at full torque (the paper's machine from 10 to 1,300 r/min), a cruise there, and back.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Cycle {
-    /// Time for which it cruises, in s, up to 3600.
+    /// Length of the cruise, in s, up to 3600.
     #[arg(long, default_value_t = 20.0, value_parser = cruise_s, allow_negative_numbers = true)]
     cruise: f64,
     /// Motor 2's own cycle.
@@ -26,7 +26,7 @@ pub struct Cycle {
 enum Second {
     /// As motor 1
     Same,
-    /// Later, the other way round, to half the speed with half the torque; it brakes while motor 1 cruises
+    /// Later, in the other direction, to half the speed with half the torque; it brakes while motor 1 cruises
     Other,
     /// No torque
     Rests,
@@ -34,17 +34,17 @@ enum Second {
 
 /// A motor's cycle, as shares of the paper's.
 struct Course {
-    /// It begins so much later, in s.
+    /// Delay of its beginning, in s.
     from_s: f64,
-    /// Direction and torque, with which its loads go; 0: it does nothing.
+    /// Factor of the torque and of the loads, with the direction as its sign; 0: the motor does nothing.
     share: f64,
-    /// Speed up to which it goes, in r/min, and the time for which it cruises, in s.
+    /// Highest speed, in r/min, and length of the cruise, in s.
     high_rpm: f64,
     cruise_s: f64,
 }
 
 impl Second {
-    /// Motor 2's cycle beside a motor 1 that cruises for so long, in s, at a speed in r/min.
+    /// Motor 2's cycle beside a motor 1 that cruises for a time in s at a speed in r/min.
     fn course(self, cruise_s: f64, high_rpm: f64) -> Course {
         match self {
             Self::Same => Course { from_s: 0.0, share: 1.0, high_rpm, cruise_s },
@@ -58,7 +58,7 @@ impl Second {
 
 const LEAD_S: f64 = 0.2;
 const STEP_S: f64 = 1e-3;
-/// From the cruise's beginning, and before its end, in s: there torque and weakening still move.
+/// Time left out after the cruise's beginning and before its end, in s: torque and field weakening still change there.
 const SETTLING_S: f64 = 0.3;
 
 /// Phase of the cycle in which a motor is.
@@ -186,7 +186,7 @@ impl Cycle {
         judge(figures, options, machine, &[&bounds[..], apart].concat())
     }
 
-    /// By how much motor 1 does something else than in the same run with a motor 2 that makes no torque.
+    /// Sets the deviations of motor 1 from the same run with a motor 2 that makes no torque.
     fn independence(
         &self,
         figures: &mut Figures,
@@ -205,32 +205,32 @@ impl Cycle {
     }
 }
 
-/// The cycle of a machine: shares of its own as the paper's machine has them.
+/// The cycle of a machine, with the same shares of its quantities as the cycle of the paper's machine.
 #[derive(Clone, Copy)]
 struct Measures {
     low_rpm: f64,
     high_rpm: f64,
-    /// By how much the highest speed may be missed, in r/min.
+    /// Amount by which the highest speed may be missed, in r/min.
     near_rpm: f64,
     full_nm: f64,
-    /// Above it power is constant.
+    /// Speed above which power is constant.
     corner_rpm: f64,
     cruise_nm: f64,
     moving_load_nm: f64,
     inertia_kg_m2: f64,
-    /// The torque needs time to go, in which the speed still falls: half of `T/slew · T/J`.
+    /// Amount by which the speed still falls while the torque takes time to go: half of `T/slew · T/J`.
     stopping_rpm: f64,
     /// Length of the cycle without the cruise, and the longest time to the highest speed, in s.
     moving_s: f64,
     accelerated_s: f64,
 }
 
-/// The paper's speeds up to which torque, then power is full, in r/min.
+/// The paper's speeds up to which first torque, then power is full, in r/min.
 const CORNER_RPM: f64 = 850.0;
 const HIGH_RPM: f64 = 1_300.0;
-/// The corner at most, as a share of the speed to which the largest power has the largest torque.
+/// Highest corner, as a share of the speed up to which the largest power allows the largest torque.
 const CORNER_SHARE: f64 = 0.85;
-/// Load while it speeds up and brakes, as a share of full torque.
+/// Load while the motor accelerates and brakes, as a share of full torque.
 const MOVING_LOAD_SHARE: f64 = 20.0 / 120.0;
 
 impl Measures {
@@ -263,8 +263,8 @@ impl Measures {
     }
 }
 
-/// Time to the highest speed against the load, with full torque to a share of that speed and full power beyond, over what full torque alone takes without a
-/// load.
+/// Time to the highest speed against the load, with full torque up to a share of that speed and full power beyond it, as a multiple of the
+/// time that full torque alone takes without a load.
 fn moving(corner: f64) -> f64 {
     const STEPS: u32 = 1_000;
     let shares = (0..STEPS).map(|step| (f64::from(step) + 0.5) / f64::from(STEPS));
@@ -272,8 +272,8 @@ fn moving(corner: f64) -> f64 {
     shares.map(|share| torque(share).max(0.05).recip()).sum::<f64>() / f64::from(STEPS)
 }
 
-/// The speed of motor 1 from which the voltage holds its operating point, in r/min: the drive tells of a limit, which may be the current's, and most of the
-/// voltage is used.
+/// The speed of motor 1 from which the voltage limits its operating point, in r/min: the drive reports a limit, which may be the
+/// current's, and most of the voltage is used.
 fn weakening_from_rpm(rows: &[Row]) -> Option<f64> {
     const MOST_OF_IT: f64 = 0.9;
     let most_v = |row: &Row| row.capacitor_v / 12.0_f64.sqrt();
@@ -281,7 +281,7 @@ fn weakening_from_rpm(rows: &[Row]) -> Option<f64> {
     rows.iter().find(weakens).map(|row| row.motors[0].speed_rpm)
 }
 
-/// Energy that comes back as both brake, where motor 1 brakes to its lowest speed.
+/// Energy that comes back while both motors brake, provided that motor 1 brakes to its lowest speed.
 fn returned(figures: &mut Figures, rows: &[Row], of: &Measures) {
     let brakes = rows.iter().position(|row| row.motors[0].torque_ref_nm < -of.full_nm / 120.0);
     let stops = brakes.and_then(|first| {
@@ -303,7 +303,7 @@ fn returned(figures: &mut Figures, rows: &[Row], of: &Measures) {
     figures.set("not_returned_percent", 100.0 - returned_percent);
 }
 
-/// Torque and current of motor 1 while it cruises with a torque in N·m, but for the time that its torque needs to get there and away.
+/// Torque and current of motor 1 while it cruises with a torque in N·m, except while that torque builds up and falls.
 fn cruise(figures: &mut Figures, rows: &[Row], cruise_nm: f64) {
     let cruises = |row: &Row| (row.motors[0].load_nm / cruise_nm - 1.0).abs() < 1e-9;
     let first = rows.iter().find(|row| cruises(row)).map(|row| row.t_s + SETTLING_S);
@@ -322,7 +322,7 @@ fn cruise(figures: &mut Figures, rows: &[Row], cruise_nm: f64) {
     figures.set("cruise_current_a", mean(|row| row.motors[0].id_a.hypot(row.motors[0].iq_a)));
 }
 
-/// Energy of all rows that is left unexplained, of the energy that went through the source either way, in percent.
+/// Energy over all rows that remains unexplained, in percent of the energy that passed through the source in either direction.
 fn residual_percent(rows: &[Row]) -> f64 {
     let through_j: f64 = rows.windows(2).map(|pair| (pair[1].source_j - pair[0].source_j).abs()).sum();
     match (rows.first(), rows.last()) {
@@ -373,7 +373,7 @@ mod tests {
         }
     }
 
-    /// Of 154 V that there are at most.
+    /// At most 154 V are available.
     #[test]
     fn a_limit_at_low_voltage_is_the_currents_and_no_weakening() {
         let rows = [row(100.0, 20.0), row(800.0, 130.0), row(900.0, 149.0)];

@@ -1,4 +1,4 @@
-//! The ZS9's drive that somebody drives by hand, as long as he likes: plant, contactors, operator and drive, stepped from outside.
+//! The ZS9's drive that somebody drives by hand for as long as he likes: plant, contactors, operator and drive, stepped from outside.
 
 use super::prelude::*;
 use super::{Controller, Line, Settings, TRACKING_RAD_S, bench};
@@ -23,9 +23,9 @@ use tractive::time::Instant;
 
 /// Slope at which a held rotor goes to another speed, in r/min per s.
 const HELD_SLOPE_RPM_S: f64 = 1_000.0;
-/// The acceleration of a rotor that runs away, in r/min per s, and its last speed as a share of the trip level.
+/// The acceleration of a rotor that runs away, in r/min per s, and its final speed as a share of the trip level.
 const RUNAWAY: (f64, f64) = (6_000.0, 1.2);
-/// Length of the bench's first recording, in s: it has no end, but makes room for so many rows.
+/// Length of the bench's first recording, in s: the recording is endless, but reserves room for that many rows.
 const ROOM_S: f64 = 0.1;
 
 /// Two motors on their bench.
@@ -35,7 +35,7 @@ pub struct Live {
     request: Arc<Mutex<DualRequest>>,
     /// The present wishes.
     pub wanted: Wanted,
-    /// Time until which the acknowledge stands, in s.
+    /// Time until which the acknowledge is set, in s.
     acknowledged_until_s: f64,
     commands: [Command; 2],
     turnings: [Turning; 2],
@@ -45,7 +45,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Switched on with the options of any run, both rotors at the start's speed; the network is empty, its contactors open.
+    /// Switches a drive on with the options of any run, both rotors at the start's speed; the network is empty, its contactors open.
     ///
     /// # Errors
     /// Names the option that is out of its range.
@@ -55,7 +55,7 @@ impl Live {
             run: RunOptions { dt: Some(start.step_s), ..options.run.clone() },
             own: options.own.clone(),
         };
-        // What the operator permits takes the place of the demands.
+        // The demands are replaced by what the operator permits.
         let nothing = |_: f64, _: SeenMotors| Orders {
             demands: [MotorDemand::Speed(0.0); 2],
             loads_nm: [0.0; 2],
@@ -87,7 +87,7 @@ impl Live {
         })
     }
 
-    /// Lets so much time pass, in s.
+    /// Lets a time in s pass.
     ///
     /// # Errors
     /// Says why the bench cannot go on.
@@ -190,7 +190,7 @@ impl Live {
         }
     }
 
-    /// Once a slot: the request.
+    /// Sets the request, once a slot.
     fn turn(&mut self) {
         let state = self.status().map_or(State::Init, |status| status.state);
         let now_s = self.bench.time_s();

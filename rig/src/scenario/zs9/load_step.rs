@@ -1,13 +1,13 @@
-//! Motor 2's load steps while motor 1 goes on: the paper's figures 14 to 19.
+//! Motor 2's load steps while motor 1 carries on: the paper's figures 14 to 19.
 
 use super::prelude::*;
 use super::scaled::LOAD_NM;
 use crate::options::finite;
 
-/// Both at one speed with a load, the paper's at 1,000 r/min with 60 N·m; motor 2's load steps at 0.6 s.
+/// Both motors at one speed with a load, on the paper's machine at 1,000 r/min with 60 N·m; motor 2's load steps at 0.6 s.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct LoadStep {
-    /// By how much motor 2's load steps, in N·m; default a third of the machine's largest torque.
+    /// Size of the step of motor 2's load, in N·m; default a third of the machine's largest torque.
     #[arg(long, value_parser = finite, allow_negative_numbers = true)]
     step: Option<f64>,
 }
@@ -17,7 +17,7 @@ const STEP_NM: f64 = 40.0;
 const STEP_S: f64 = 0.6;
 const DURATION_S: f64 = 1.2;
 const LEAD_S: f64 = 0.6;
-/// Inertia for which the speed loops are made, in kg·m².
+/// Inertia for which the speed loops are designed, in kg·m².
 pub const INERTIA_KG_M2: f64 = 0.1;
 
 impl Scenario<Zs9> for LoadStep {
@@ -25,7 +25,7 @@ impl Scenario<Zs9> for LoadStep {
         let (step_nm, speed_rpm) = (self.step_nm(machine), scaled_rpm(SPEED_RPM, machine));
         let whole_nm = scaled_nm(LOAD_NM, machine);
         let operator = move |t_s: f64, _: SeenMotors| {
-            // The drive finds the speeds first; then the loads come.
+            // The drive finds the speeds first, then the loads come.
             let load_nm = whole_nm * ramp(t_s, -0.5, -0.4);
             let stepped = if t_s >= STEP_S - 1e-9 { step_nm } else { 0.0 };
             Orders {
@@ -73,7 +73,7 @@ impl Scenario<Zs9> for LoadStep {
 }
 
 impl LoadStep {
-    /// By how much motor 2's load steps, in N·m.
+    /// Size of the step of motor 2's load, in N·m.
     fn step_nm(&self, machine: &Machine) -> f64 {
         self.step.unwrap_or(scaled_nm(STEP_NM, machine))
     }
@@ -103,7 +103,7 @@ impl LoadStep {
     }
 }
 
-/// Time from the step until the speed is back for good, in ms; nothing where it is not.
+/// Time from the step until the speed is back for good, in ms; none if it never is.
 fn back_ms(after: &[Row], is_off: impl Fn(&Row) -> bool) -> Option<f64> {
     let back = after.iter().rposition(is_off).map_or(0, |last_off| last_off + 1);
     after.get(back).map(|row| (row.t_s - STEP_S).max(0.0) * 1e3)

@@ -47,7 +47,7 @@ use tractive::recorder::DualRecorder;
 use tractive::time::Instant;
 use tractive::wire::DualSetup;
 
-/// Largest source and link voltage that is simulated, over the source's nominal one: the drive trips long before.
+/// Largest source and link voltage that is simulated, as a multiple of the source's nominal one: the drive trips long before.
 const LARGEST: f64 = 3.0;
 
 /// Two motors on a Z-source nine-switch inverter.
@@ -60,24 +60,25 @@ pub struct Zs9Options {
     /// Carrier frequency, in Hz, 10000 or 20000.
     #[arg(long, default_value_t = 10_000, value_parser = carrier_hz, allow_negative_numbers = true)]
     pub carrier_hz: u32,
-    /// Link voltage outside shoot-through, in V; default the machine's, the paper's 667, a shoot-through duty of 0.2.
+    /// Link voltage outside shoot-through, in V; default the machine's (the paper's: 667, which means a shoot-through duty of 0.2).
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub uin: Option<f64>,
     /// Place of the zero vectors: s, rs, rthd, zvo, rthd-central or rthd-slide.
     #[serde(serialize_with = "scheme_name")]
     #[arg(long, default_value = "rthd", value_parser = scheme)]
     pub scheme: Scheme,
-    /// Something that goes wrong, NAME@SECONDS: source-short, source-low, source-high, sensor-lost-1, sensor-lost-2,
+    /// Fault to inject, NAME@SECONDS: source-short, source-low, source-high, sensor-lost-1, sensor-lost-2,
     /// sensor-frozen-1, sensor-frozen-2, sensor-jump-2, overcurrent, not-finite, leg-stuck-on, leg-stuck-off.
     #[arg(long)]
     pub inject: Option<Injection<Kind>>,
     /// Leave the dead time uncompensated: the pulses are not corrected.
     #[arg(long)]
     pub uncompensated: bool,
-    /// Threshold and slope of an IGBT, and of a diode: of the nine devices and of the source's switch.
+    /// Threshold and slope of an IGBT, and of a diode, for the nine devices and the source's switch.
     #[arg(long, value_name = "V,MOHM,V,MOHM", allow_negative_numbers = true)]
     pub device_drop: Option<Drops>,
-    /// Drops, dead time, steps and noise of the current converters, ripple of the source and a warm winding at once; one that is given as well keeps its own value.
+    /// Drops, dead time, steps and noise of the current converters, ripple of the source and a warm winding at once; an option that is also
+    /// given keeps its own value.
     #[arg(long)]
     pub real: bool,
 }
@@ -87,7 +88,7 @@ pub type Options = crate::options::Options<Zs9Options>;
 
 /// A scenario's inputs.
 pub struct Plan {
-    /// Before the recording, in s: the drive starts and settles.
+    /// Time before the recording, in s, in which the drive starts and settles.
     pub lead_s: f64,
     /// Length of the recording, in s.
     pub duration_s: f64,
@@ -101,12 +102,12 @@ pub struct Plan {
     pub operator: Box<dyn Operator + Send>,
     /// Edges are kept.
     pub edges: bool,
-    /// The line side, where there is one; the network is then empty at first.
+    /// The line side, if there is one; the network is then empty at first.
     pub line: Option<LineTimes>,
 }
 
 impl Plan {
-    /// For motors that are commanded directly; lead and length in s, speeds of free rotors at the beginning in r/min.
+    /// A plan for motors that are commanded directly; lead and length in s, speeds of free rotors at the beginning in r/min.
     pub fn driven(
         (lead_s, duration_s): (f64, f64),
         speeds: [SpeedSource; 2],
@@ -229,7 +230,7 @@ impl System for Zs9 {
     }
 }
 
-/// A run on the host, but for the control law.
+/// A run on the host, except for the control law.
 struct OnHost<'a> {
     name: &'a str,
     bench: Bench,
@@ -296,23 +297,24 @@ fn source_v(options: &Options, machine: &Machine) -> f64 {
     options.udc.unwrap_or(Zs9::source_v(machine))
 }
 
-/// Voltage of the link outside shoot-through that is wanted, in V.
+/// Link voltage that is wanted outside shoot-through, in V.
 pub fn link_v(options: &Options, machine: &Machine) -> f64 {
     options.own.uin.unwrap_or(machine.folder.parameters.zs9_link_v)
 }
 
-/// Voltage of the capacitors that is wanted, in V: of it are the link's pulses.
+/// Capacitor voltage that is wanted, in V: the link's pulses are made of it.
 fn capacitor_v(options: &Options, machine: &Machine) -> f64 {
     0.5 * (link_v(options, machine) + source_v(options, machine))
 }
 
-/// Free rotors, loaded by what the operator says.
+/// Free rotors, with the loads that the operator gives.
 pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
     [(); 2].map(|()| SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 })
 }
 
-/// Figures beside their bounds: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or a link below the machine's own, they are only reported: there
-/// the link's are farther off. But one that never came, where nothing was injected, falls short of any bound.
+/// Verdicts on figures: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or
+/// with a link below the machine's own, figures are only reported, because the link's are farther off there. But if nothing was injected,
+/// a figure that never came falls short of any bound.
 pub fn judge(
     figures: &Figures,
     options: &Options,
@@ -334,7 +336,7 @@ pub fn rad_s(rpm: f64) -> f64 {
     rpm * TAU / 60.0
 }
 
-/// 0 before `from`, 1 after `to`, a straight line between.
+/// 0 before `from`, 1 after `to`, and a straight line between them.
 pub fn ramp(t_s: f64, from_s: f64, to_s: f64) -> f64 {
     ((t_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0)
 }

@@ -15,7 +15,7 @@ pub fn draw(page: &mut Page) {
     page.picture("figure 8", "ZVO-SVPWM", sequences::figure8());
     for scheme in [Scheme::Rthd, Scheme::S, Scheme::Rs, Scheme::Zvo] {
         let title = format!("{}: shoot-through beside the zero vectors", scheme.name());
-        // The paper shows it of one scheme.
+        // The paper shows it for one scheme.
         let figure = (scheme == Scheme::Rthd).then_some("figure 9");
         page.picture(figure, &title, sequences::shoot_through(scheme));
     }

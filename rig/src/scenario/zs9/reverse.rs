@@ -1,8 +1,8 @@
-//! The motors turn opposite ways: the paper's figures 20 to 23.
+//! The motors turn in opposite directions: the paper's figures 20 to 23.
 
 use super::prelude::*;
 
-/// Both at one speed, the paper's at 800 r/min; motor 2 goes to the same speed backwards from 0.5 s to 1.5 s.
+/// Both motors at one speed, 800 r/min on the paper's machine; motor 2 goes to the same speed backwards from 0.5 s to 1.5 s.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Reverse {
     /// Motor 2 keeps its direction, for comparison.
@@ -11,17 +11,17 @@ pub struct Reverse {
 }
 
 const SPEED_RPM: f64 = 800.0;
-/// Load at that speed, in N·m; it goes with the speed and its sign.
+/// Load at that speed, in N·m; it is proportional to the speed, sign included.
 const LOAD_NM: f64 = 20.0;
 const BEGINS_S: f64 = 0.5;
-/// Time in which it reverses, and after it, in s.
+/// Time for the reversal, and time after it, in s.
 const REVERSES_S: f64 = 1.0;
 const AFTER_S: f64 = 0.5;
-/// Share of the largest torque that may turn the rotor round.
+/// Share of the largest torque that may be used to reverse the rotor.
 const TURNING_SHARE: f64 = 0.5;
 const LEAD_S: f64 = 0.6;
 
-/// The speed in r/min, and the time at which motor 2 has turned round, in s: later where its rotor is too heavy for that.
+/// The speed in r/min, and the time at which motor 2 has reversed, in s: later if its rotor is too heavy for the usual time.
 fn measures(machine: &Machine) -> (f64, f64) {
     let parameters = &machine.folder.parameters;
     let speed_rpm = scaled_rpm(SPEED_RPM, machine);

@@ -19,7 +19,7 @@ pub fn scaled_nm(torque_nm: f64, machine: &Machine) -> f64 {
     torque_nm * (machine.folder.parameters.max_torque_nm / MAX_NM)
 }
 
-/// An inertia of that machine, in kg·m², such that the same shares of torque take this one as long to the same shares of speed.
+/// An inertia of that machine, in kg·m², scaled so that the same shares of torque take this one as long to the same shares of speed.
 pub fn scaled_kg_m2(inertia_kg_m2: f64, machine: &Machine) -> f64 {
     inertia_kg_m2 * (scaled_nm(1.0, machine) / scaled_rpm(1.0, machine))
 }
@@ -29,10 +29,10 @@ pub fn known(machine: &Machine, paper: f64, other: f64) -> f64 {
     if machine.is(MACHINE) { paper } else { other }
 }
 
-/// The most by which link and capacitors may be off with another machine than the paper's, in %: network, source and carrier are the same for all.
+/// Largest deviation of link and capacitors with a machine other than the paper's, in %: network, source and carrier are the same for all.
 pub const LINK_OFF_PERCENT: f64 = 3.0;
 
-/// Load of the paper's motors before that of one of them steps, in N·m.
+/// Load of the paper's motors before the load of one of them steps, in N·m.
 pub const LOAD_NM: f64 = 60.0;
 
 /// The check that the machine can carry a step of the load, in N·m.

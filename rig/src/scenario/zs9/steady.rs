@@ -1,4 +1,4 @@
-//! Harmonics in steady state: what the schemes of the nine-switch modulator differ in.
+//! Harmonics in steady state, in which the schemes of the nine-switch modulator differ.
 
 use super::patterns;
 use super::prelude::*;
@@ -6,16 +6,16 @@ use crate::scenario::System;
 use crate::verdict::torque_bound;
 use tractive::nine_switch::Scheme;
 
-/// Both motors at prescribed speeds, the paper's with 60 N·m each.
+/// Both motors at prescribed speeds, with 60 N·m each on the paper's machine.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Steady;
 
 /// Speeds of the upper and the lower motor, in r/min.
 pub const SPEEDS_RPM: [f64; 2] = [1000.0, 700.0];
-/// Periods of the currents of both in the same time.
+/// Periods of both motors' currents in the same time.
 const PERIODS: [f64; 2] = [10.0, 7.0];
 const TORQUE_NM: f64 = 60.0;
-/// The recording's length, in s, to whole such times: of the paper's machine 20 and 14 periods.
+/// Length of the recording, in s, rounded to whole multiples of that time: with the paper's machine 20 and 14 periods.
 const DURATION_S: f64 = 0.3;
 /// A coarser step would average ripple away.
 const STEP_S: f64 = 1e-6;
@@ -80,8 +80,8 @@ impl Scenario<Zs9> for Steady {
     }
 }
 
-/// Of each scheme the distortion of the upper and of the lower motor's current in %, and the ripple of the inductors' current in A, at 10 kHz
-/// and 667 V: the most that is allowed.
+/// Upper bounds of each scheme at 10 kHz and 667 V: the distortion of the upper and of the lower motor's current in %, and the ripple of the
+/// inductors' current in A.
 const BOUNDS: [(Scheme, [f64; 3]); 4] = [
     (Scheme::S, [2.11, 1.545, 5.05]),
     (Scheme::Rs, [2.44, 1.97, 10.15]),
@@ -89,10 +89,10 @@ const BOUNDS: [(Scheme, [f64; 3]); 4] = [
     (Scheme::Zvo, [2.14, 1.65, 10.15]),
 ];
 
-/// With flaws the mean torque may be off by so much, in %.
+/// Largest deviation of the mean torque with flaws, in %.
 const FLAWED_PERCENT: f64 = 2.0;
 
-/// The mean torque's.
+/// Verdicts on the mean torque.
 fn torque_verdicts(off_percent: [f64; 2], options: &Options, machine: &Machine) -> [Verdict; 2] {
     let Zs9Options { device_drop, uncompensated, .. } = options.own;
     let ideal = if device_drop.is_some() { FLAWED_PERCENT } else { known(machine, 0.1, 0.5) };
@@ -101,7 +101,7 @@ fn torque_verdicts(off_percent: [f64; 2], options: &Options, machine: &Machine) 
     [0, 1].map(|k| Verdict::at_most(&of[k], off_percent[k], at_most))
 }
 
-/// Bounds where something is known of the machine and the scheme at this carrier and link.
+/// Verdicts with bounds, if any are known for the machine and the scheme at this carrier and link.
 fn verdicts(figures: &Figures, options: &Options, machine: &Machine) -> Vec<Verdict> {
     let Zs9Options { carrier_hz, scheme, .. } = options.own;
     let usual = carrier_hz == 10_000 && link_v(options, machine) == machine.folder.parameters.zs9_link_v;

@@ -1,15 +1,15 @@
-//! A short drive of both motors for `cargo xtask timing`: every instruction of the interrupts is logged there.
+//! A short drive of both motors for `cargo xtask timing`, which logs every instruction of the interrupts.
 
 use super::prelude::*;
 use crate::law::LawName;
 
-/// Full torque by the speed loops at prescribed speeds: motoring at low and at high speed, then braking from there.
+/// Full torque demanded by the speed loops at prescribed speeds: motoring at low and at high speed, then braking from there.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Timing;
 
 /// Largest speed of the paper's machine, in r/min.
 const MAX_RPM: f64 = 1_500.0;
-/// The motors turn opposite ways: time in s, r/min of the paper's machine. A quicker ramp would count as a lost angle.
+/// The motors turn in opposite directions: time in s, r/min of the paper's machine. A quicker ramp would count as a lost angle.
 const PROFILE: [(f64, f64); 4] = [(0.0, 700.0), (0.01, 700.0), (0.11, 1450.0), (0.14, 1450.0)];
 const BRAKES_FROM_S: f64 = 0.125;
 const DURATION_S: f64 = 0.14;
@@ -17,13 +17,13 @@ const LEAD_S: f64 = 0.03;
 /// A speed out of reach, in r/min: the loop asks for all the torque there is.
 const FAR_RPM: f64 = 20_000.0;
 
-/// Figures, and the time in s over which each is the mean: at the highest speed, before the torque reverses and after it.
+/// Figures, and the times in s over which each is averaged: at the highest speed, before the torque reverses and after it.
 const MOTORING: (&str, (f64, f64)) = ("motoring_torque_error_percent", (0.115, BRAKES_FROM_S));
 const BRAKING: (&str, (f64, f64)) = ("braking_torque_error_percent", (0.13, DURATION_S));
-/// The most that torque may be off its reference there, in %.
+/// Largest deviation of the torque from its reference there, in %.
 const MOST_OFF_PERCENT: f64 = 1.0;
 
-/// The mean torque off its reference, of the motor of which it is farther off, in %.
+/// Deviation of the mean torque from its reference, in %, for the motor with the larger one.
 fn off_percent(rows: &[Row]) -> f64 {
     let of_motor = |k: usize| {
         let torque_nm = mean(rows, |row| row.motors[k].torque_nm);
@@ -53,7 +53,7 @@ impl Scenario<Zs9> for Timing {
         for (name, (from_s, to_s)) in [MOTORING, BRAKING] {
             figures.set(name, off_percent(figures::window(recording, from_s, to_s)));
         }
-        // The papers' law is 2.4 % off then: of it this is told, not judged.
+        // The papers' law is 2.4 % off then: for it this is reported, not judged.
         let is_judged = matches!(options.law, LawName::Tractive);
         let braking = if is_judged { MOST_OFF_PERCENT } else { f64::INFINITY };
         let bounds = [
