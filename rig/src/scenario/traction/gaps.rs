@@ -57,7 +57,7 @@ struct Gap {
     holding_nm: f64,
     /// Time from the line's return until the torque is back to its earlier value within a tenth of the largest torque, in s.
     back_s: f64,
-    /// The mean torque afterwards over that before, less one.
+    /// The mean torque afterwards less that before, over the largest torque.
     torque_error: f64,
     line_peak_a: f64,
 }

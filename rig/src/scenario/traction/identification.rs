@@ -24,7 +24,7 @@ use tractive::recorder::Recorder;
 use tractive::time::Instant;
 use tractive::wire;
 
-/// The longest experiment, in carrier halves; and in s.
+/// The longest experiment: so many carrier halves, and a time in s besides.
 const MOST_HALVES: f64 = 28_000.0;
 const LEAST_S: f64 = 1.0;
 /// The longest experiment over the protocol, with all its frames, in s; and the step of its trace.
