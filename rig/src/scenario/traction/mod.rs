@@ -87,7 +87,9 @@ impl System for Traction {
             parameters.max_speed_rpm * std::f64::consts::PI / 30.0 * f64::from(parameters.pole_pairs);
         // A drive that knows the filter treats it as a delay.
         let most_known_us = shortest_half_us.min(0.3e6 / fastest_rad_s);
-        let own = |name: &str| scenario.get(name).and_then(Value::as_f64).unwrap_or(0.0);
+        let own_or = |name: &str, or: f64| scenario.get(name).and_then(Value::as_f64).unwrap_or(or);
+        let own = |name: &str| own_or(name, 0.0);
+        let sweep_rpm_s = scaled::of_rated_rpm(sweep::SLOPE_RPM_S, machine);
         let (switching_hz, control_hz) = (parameters.max_switching_hz, control_hz(options, machine));
         // A carrier lasts at least a control period.
         ensure!(
@@ -102,6 +104,7 @@ impl System for Traction {
             ("--speed", own("speed"), -fastest_rpm, fastest_rpm),
             ("--torque", own("torque"), -most_nm, most_nm),
             ("--to", own("to"), -fastest_rpm, fastest_rpm),
+            ("--slope", own_or("slope", sweep_rpm_s), sweep_rpm_s / 20.0, 100.0 * sweep_rpm_s),
             ("--current-gain", options.own.current_gain, -50.0, 100.0),
             ("--udc-gain", options.own.udc_gain, -50.0, 100.0),
             ("--angle-1f-deg", options.own.angle_1f_deg, -90.0, 90.0),

@@ -23,7 +23,7 @@ pub struct Sweep {
     /// Last speed, in r/min; default the machine's rated one.
     #[arg(long, value_parser = finite, allow_negative_numbers = true)]
     to: Option<f64>,
-    /// Speed's slope, in r/min a second; default an eighth of the machine's rated speed.
+    /// Slope of the speed, in r/min a second, from a twentieth to a hundred times the default, which is an eighth of the machine's rated speed.
     #[arg(long, value_parser = crate::options::positive)]
     slope: Option<f64>,
 }
@@ -35,7 +35,8 @@ impl Default for Sweep {
     }
 }
 
-const SLOPE_RPM_S: f64 = 250.0;
+/// Slope of the speed by default, of a machine of 2,000 r/min, in r/min a second.
+pub(super) const SLOPE_RPM_S: f64 = 250.0;
 const HOLD_S: f64 = 1.0;
 
 impl Scenario<Traction> for Sweep {
