@@ -89,7 +89,7 @@ impl System for Traction {
         let most_known_us = shortest_half_us.min(0.3e6 / fastest_rad_s);
         let own_or = |name: &str, or: f64| scenario.get(name).and_then(Value::as_f64).unwrap_or(or);
         let own = |name: &str| own_or(name, 0.0);
-        let sweep_rpm_s = scaled::of_rated_rpm(sweep::SLOPE_RPM_S, machine);
+        let sweep_rpm_s = scaled::sweep_rpm_s(machine);
         let (switching_hz, control_hz) = (parameters.max_switching_hz, control_hz(options, machine));
         // A carrier lasts at least a control period.
         ensure!(

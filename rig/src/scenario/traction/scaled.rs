@@ -18,6 +18,11 @@ pub(super) fn of_rated_rpm(speed_rpm: f64, machine: &Machine) -> f64 {
     speed_rpm * (machine.folder.parameters.rated_speed_rpm / 2_000.0)
 }
 
+/// Slope of the speed in a sweep, in r/min a second.
+pub(super) fn sweep_rpm_s(machine: &Machine) -> f64 {
+    of_rated_rpm(250.0, machine)
+}
+
 /// Voltage of the machine without current at a speed in r/min, peak line to line, in V.
 pub(crate) fn emf_v(speed_rpm: f64, machine: &Machine) -> f64 {
     let turns_s = speed_rpm.abs() / 60.0 * f64::from(machine.folder.parameters.pole_pairs);

@@ -2,7 +2,7 @@
 
 use super::plan::LEAD_S;
 use super::prelude::*;
-use super::scaled::of_rated_rpm;
+use super::scaled::sweep_rpm_s;
 use super::switches;
 use crate::options::On;
 use crate::pictures::chai::runs::change;
@@ -35,14 +35,12 @@ impl Default for Sweep {
     }
 }
 
-/// Slope of the speed by default, of a machine of 2,000 r/min, in r/min a second.
-pub(super) const SLOPE_RPM_S: f64 = 250.0;
 const HOLD_S: f64 = 1.0;
 
 impl Scenario<Traction> for Sweep {
     fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
         let to_rpm = self.to.unwrap_or(machine.folder.parameters.rated_speed_rpm);
-        let slope_rpm_s = self.slope.unwrap_or(of_rated_rpm(SLOPE_RPM_S, machine));
+        let slope_rpm_s = self.slope.unwrap_or(sweep_rpm_s(machine));
         let ramp_s = to_rpm.abs() / slope_rpm_s;
         let mut speed = vec![(0.0, 0.0), (ramp_s, to_rpm)];
         let mut duration_s = ramp_s + HOLD_S;
