@@ -34,8 +34,11 @@ fn found(record: &toml::Table, step: usize, name: &str) -> f64 {
 #[test]
 fn from_the_wiring_to_the_first_torque() {
     let place = tempfile::tempdir().unwrap();
-    let (code, said, record) = commissioned("--dead-time-us 5 --rs-error 10", place.path());
+    let (code, said, record) = commissioned("--dead-time-us 5 --rs-error 10 --device-drop 2,5,2,5", place.path());
     assert_eq!(code, 0, "{said}");
+    let advice = record["step"][1]["advice"][0].as_str().unwrap();
+    assert!(advice.contains("device_threshold_v: add about "), "{advice}");
+    assert!((found(&record, 1, "threshold_v") - 2.0).abs() < 0.2);
     let names = ["wiring", "identification", "tables", "first torque"];
     assert_eq!(steps(&record), names.map(|name| (name.to_owned(), true)));
     assert!(record["finished"].as_bool().unwrap() && record["on"].as_str() == Some("host"));

@@ -98,6 +98,26 @@ fn the_devices_thresholds_are_told_from_the_dead_time() {
     }
 }
 
+/// Drops of devices that the drive has found itself and is then told: the first step settles in 2.6 ms, where it takes 14 to 20 if it knows nothing of them.
+#[test]
+fn steps_settle_with_the_threshold_that_was_found() {
+    let machine = Machine::load("pmasynrm-180kw").unwrap();
+    for drop in ["2,5,1.5,3", "2,5,2,5"] {
+        let found = outcome(&machine, &format!("{FLAWS} --device-drop {drop}"));
+        let advice = found.threshold_advice().unwrap();
+        let threshold_v = advice.rsplit(' ').next().unwrap();
+        let told = format!("load-steps --device-drop {drop} --device-drop-told {threshold_v},0");
+        let chosen = catalogue::of_traction(&told).unwrap();
+        let recording = chosen.drive(&machine).unwrap();
+        let figures = chosen.figures(&recording, &machine);
+        for step in figures.values()["steps"].as_array().unwrap() {
+            let settles_ms = step["settling_2_percent_ms"].as_f64().unwrap();
+            assert!(settles_ms < 5.0, "{told}: {settles_ms} ms");
+        }
+    }
+    assert!(outcome(&machine, FLAWS).threshold_advice().is_none());
+}
+
 /// Excess of the found threshold over the true one, in V: without devices' drops, and with them.
 fn thresholds_off_v((name, flaws, seed): (&str, &str, u32)) -> [f64; 2] {
     let machine = Machine::load(name).unwrap();

@@ -148,6 +148,7 @@ fn identification(commission: &Commission, machine: &Machine, _record: &Record) 
     let offset_a = REST_SHARE * machine.folder.parameters.max_current_a;
     step.within("current_offset_a", outcome.offset_a, [0.0, offset_a]);
     advise(&outcome.signs, &mut step);
+    outcome.threshold_advice().into_iter().for_each(|advice| step.advise(advice));
     step.within("turned_by_pulses_deg", outcome.turned_deg, [0.0, 5.0]);
     step.within("largest_current_of_the_bound", outcome.peak_share, [0.0, 1.1]);
     step.find("stator_resistance_ohm", outcome.fit.resistance_ohm);

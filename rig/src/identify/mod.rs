@@ -91,6 +91,9 @@ pub fn command(identify: &Identify) -> Result<ExitCode> {
         crate::say!("{}", serde_json::to_string(outcome.figures().values())?);
     } else {
         crate::say!("{}\n", report::text(&outcome.figures()));
+        if let Some(advice) = outcome.threshold_advice() {
+            crate::say!("{advice}\n");
+        }
         crate::say!("machine folder: {}\nreport: {}", out.display(), page.display());
     }
     Ok(ExitCode::SUCCESS)

@@ -49,18 +49,46 @@ impl Drops {
         ])
     }
 
-    /// The check that a power stage's keys may name them.
-    fn check_known(&self) -> Result<()> {
+    /// The mean of IGBT and diode.
+    fn mean(&self) -> Told {
         let Self([igbt_v, igbt_mohm, diode_v, diode_mohm]) = *self;
-        let volts = [igbt_v, diode_v].map(|volts| ("--device-drop", volts, 0.0, 20.0));
-        let slopes = [igbt_mohm, diode_mohm].map(|slope| ("--device-drop", slope, 0.0, 150.0));
-        within(&[volts, slopes].concat())
+        Told([0.5 * (igbt_v + diode_v), 0.5 * (igbt_mohm + diode_mohm)])
     }
 
     /// The drops as the plant has them.
     pub fn devices(&self) -> DeviceDrops {
         let Self([igbt_v, igbt_mohm, diode_v, diode_mohm]) = *self;
         DeviceDrops { igbt_v, igbt_ohm: 1e-3 * igbt_mohm, diode_v, diode_ohm: 1e-3 * diode_mohm }
+    }
+}
+
+/// Mean threshold in V and slope in mΩ of IGBT and diode, written `V,MOHM`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Told([f64; 2]);
+
+impl FromStr for Told {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let values = list::<2>(text).filter(|values| values.iter().all(|value| *value >= 0.0));
+        values.map(Self).ok_or_else(|| "must be V,MOHM, each at least 0, for instance 1.75,4".to_owned())
+    }
+}
+
+impl Told {
+    /// The check that a power stage's keys may name them.
+    fn check(self) -> Result<()> {
+        let Self([threshold_v, slope_mohm]) = self;
+        within(&[
+            ("threshold of the drop that the drive is told", threshold_v, 0.0, 20.0),
+            ("slope of the drop that the drive is told", slope_mohm, 0.0, 150.0),
+        ])
+    }
+
+    /// The same in mV and hundredths of a mΩ.
+    pub fn steps(self) -> (u32, u32) {
+        let Self([threshold_v, slope_mohm]) = self;
+        ((1e3 * threshold_v).round() as u32, (100.0 * slope_mohm).round() as u32)
     }
 }
 
@@ -116,6 +144,12 @@ impl Serialize for Drops {
     }
 }
 
+impl Serialize for Told {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&written(&self.0))
+    }
+}
+
 impl Serialize for Times {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&written(&self.0))
@@ -161,6 +195,9 @@ pub struct FlawOptions {
     /// The drive knows the mean threshold and slope of --device-drop, as from its power stage's key, and compensates for the drop.
     #[arg(long)]
     pub device_drop_known: bool,
+    /// Threshold and slope of the devices that the drive is told, true or not, as from its power stage's keys.
+    #[arg(long, value_name = "V,MOHM", allow_negative_numbers = true, conflicts_with = "device_drop_known")]
+    pub device_drop_told: Option<Told>,
     /// Time by which each phase's current is sampled before the common instant assumed for all phases, in µs.
     #[arg(long, value_name = "U,V,W", allow_negative_numbers = true)]
     pub adc_skew_us: Option<Times>,
@@ -343,7 +380,13 @@ impl FlawOptions {
         ])?;
         let drops = self.device_drop.unwrap_or_default();
         drops.check(parameters.dc_link_nominal_v, machine)?;
-        if self.device_drop_known { drops.check_known() } else { Ok(()) }
+        self.told_drop().check()
+    }
+
+    /// The drop that the drive is told of.
+    pub fn told_drop(&self) -> Told {
+        let known = self.device_drop.filter(|_| self.device_drop_known).map(|drops| drops.mean());
+        known.or(self.device_drop_told).unwrap_or_default()
     }
 
     /// Offsets of the current sensors, as shares of the converters' range.

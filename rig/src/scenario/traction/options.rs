@@ -175,14 +175,6 @@ impl TractionOptions {
         };
         (1e3 * known).round() as u32
     }
-
-    /// Mean threshold and slope of the devices that the drive is told, in mV and hundredths of a mΩ.
-    pub(super) fn known_drops(&self) -> (u32, u32) {
-        let drops = self.flaws.drops();
-        let steps = |igbt: f64, diode: f64, per: f64| (0.5 * per * (igbt + diode)).round() as u32;
-        let known = (steps(drops.igbt_v, drops.diode_v, 1e3), steps(drops.igbt_ohm, drops.diode_ohm, 1e5));
-        if self.flaws.device_drop_known { known } else { (0, 0) }
-    }
 }
 
 /// Options of a run.

@@ -30,7 +30,7 @@ pub(super) fn clock(options: &Options, machine: &Machine) -> Clock {
 
 pub(super) fn setup(plan: &Plan, options: &Options, machine: &Machine, over_protocol: bool) -> Setup {
     let uncompensated = options.own.uncompensated;
-    let (threshold_mv, slope_10uohm) = options.own.known_drops();
+    let (threshold_mv, slope_10uohm) = options.own.flaws.told_drop().steps();
     Setup {
         control_ticks: clock(options, machine).control_ticks,
         min_pulse_ticks: ticks(options.min_pulse_us(machine.folder.parameters.max_switching_hz)),
