@@ -34,7 +34,8 @@ fn found(record: &toml::Table, step: usize, name: &str) -> f64 {
 #[test]
 fn from_the_wiring_to_the_first_torque() {
     let place = tempfile::tempdir().unwrap();
-    let (code, said, record) = commissioned("--dead-time-us 5 --rs-error 10 --device-drop 2,5,2,5", place.path());
+    let (code, said, record) =
+        commissioned("--dead-time-us 5 --rs-error 10 --device-drop 2,5,2,5", place.path());
     assert_eq!(code, 0, "{said}");
     let advice = record["step"][1]["advice"][0].as_str().unwrap();
     assert!(advice.contains("device_threshold_v: add about "), "{advice}");

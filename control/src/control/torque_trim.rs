@@ -6,7 +6,9 @@
 //! missing on average is slowly added to the demand, and what was learned under one pattern holds for the next one.
 //!
 //! Under optimised patterns the average is taken over whole sixths of a turn, in which torque repeats. A trim that followed the torque ripple would shake the
-//! reference in step with the pulses, whose edges reach the flux linkage in one direction at a time: half a percent too much torque was made.
+//! reference in step with the pulses, whose edges reach the flux linkage in one direction at a time: half a percent too much torque was made. Nor may a sixth
+//! end with the period in which it ends: at 1,921 r/min and a tenth of the torque, averages over 1.1 sixths moved the mean torque by 6 N·m every five sixths,
+//! where it now moves by 1.
 
 use crate::frames::{limit, limit_magnitude};
 use crate::machine::Tables;
@@ -68,13 +70,19 @@ struct Sixth {
 impl Sixth {
     const NONE: Self = Self { passed_s: 0.0, missing_nms: 0.0 };
 
-    /// Takes a period in which so much torque has been missing, in N·m; returns the mean and the time of the sixth that it ends.
+    /// Takes a period in which so much torque has been missing, in N·m; returns the mean and the time of the sixth that it ends. The rest of the period belongs to
+    /// the next sixth.
     fn step(&mut self, missing_nm: f32, period_s: f32, omega: f32) -> Option<(f32, f32)> {
-        let Self { passed_s, missing_nms } = *self;
-        let (passed_s, missing_nms) = (passed_s + period_s, missing_nms + missing_nm * period_s);
-        let ends = passed_s * omega.abs() >= core::f32::consts::FRAC_PI_3;
-        *self = if ends { Self::NONE } else { Self { passed_s, missing_nms } };
-        ends.then_some((missing_nms / passed_s, passed_s))
+        let passed_s = self.passed_s + period_s;
+        let missing_nms = self.missing_nms + missing_nm * period_s;
+        if passed_s * omega.abs() < core::f32::consts::FRAC_PI_3 {
+            *self = Self { passed_s, missing_nms };
+            return None;
+        }
+        let sixth_s = core::f32::consts::FRAC_PI_3 / omega.abs();
+        let next_s = passed_s - sixth_s;
+        *self = Self { passed_s: next_s, missing_nms: missing_nm * next_s };
+        Some(((missing_nms - self.missing_nms) / sixth_s, sixth_s))
     }
 }
 
@@ -169,6 +177,8 @@ fn scale(demand_nm: f32, largest_nm: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use super::*;
 
     const LARGEST_NM: f32 = 1_000.0;
@@ -266,30 +276,34 @@ mod tests {
         assert!(trim.curvature > 0.0);
     }
 
-    /// A torque whose ripple repeats every sixth of a turn moves the trim by its mean alone, once a sixth.
+    /// A torque whose ripple repeats every sixth of a turn moves the trim by its mean alone, once a sixth, although sixths end within periods: by 0.5 N·m at most
+    /// beside it, where it was 2.6 when a sixth ended with its last period.
     #[cfg(feature = "optimal")]
     #[test]
     fn a_ripple_of_torque_does_not_shake_the_trim() {
-        const SAMPLES: u32 = 20;
+        const PERIODS: f32 = 7.4;
         let (mut trim, omega) = (TorqueTrim::new(), -800.0_f32);
-        let period_s = core::f32::consts::FRAC_PI_3 / omega.abs() / SAMPLES as f32 * 1.000_1;
-        let mut step = |sample: u32| {
-            let ripple_nm = if sample % SAMPLES < SAMPLES / 2 { 200.0 } else { -200.0 };
-            let measured_nm = 899.0 + ripple_nm;
+        let sixth_s = core::f32::consts::FRAC_PI_3 / omega.abs();
+        let period_s = sixth_s / PERIODS;
+        // Integral of the ripple, two waves of 200 N·m a sixth, in N·m and periods.
+        let ripple = |period: f32| {
+            let wave_rad = 2.0 * core::f32::consts::TAU / PERIODS;
+            200.0 / wave_rad * (1.0 - (wave_rad * period).cos())
+        };
+        let mut step = |period: f32| {
+            let measured_nm = 899.0 + ripple(period + 1.0) - ripple(period);
             trim.step(&Input { measured_nm, period_s, by_sixths: Some(omega), ..HELD });
             trim.trim_nm(900.0, 0.0, RIPPLE_SHARE, LARGEST_NM)
         };
-        let held = (HOLD_S / period_s) as u32 + 2;
-        assert_eq!((0..held).map(|_| step(0)).fold(0.0, f32::max), 0.0);
-        let mut before = 0.0;
-        for sample in 1..=10 * SAMPLES {
-            let (now, ends) = (step(sample), sample % SAMPLES == 0);
-            let mean_nm = BANDWIDTH_RAD_S * SAMPLES as f32 * period_s;
-            assert!(
-                (now - before - if ends { mean_nm } else { 0.0 }).abs() < 1e-3,
-                "{sample}: {before} {now}"
-            );
-            before = now;
+        let held = (HOLD_S / period_s).ceil() as u16 + 1;
+        assert_eq!((0..held).map(|_| step(0.0)).fold(0.0, f32::max), 0.0);
+        let mut worst_nm = 0.0_f32;
+        for period in 0..500_u16 {
+            let sixths = (f32::from(period + 1) / PERIODS + 1e-4).floor();
+            let mean_nm = BANDWIDTH_RAD_S * sixth_s * sixths;
+            worst_nm = worst_nm.max((step(f32::from(period)) - mean_nm).abs());
         }
+        std::println!("{worst_nm}");
+        assert!(worst_nm < 0.5, "{worst_nm} N·m");
     }
 }
