@@ -12,6 +12,8 @@ pub enum Kind {
     Current(usize, CurrentFault),
     /// The angle sensor.
     Angle(AngleFault),
+    /// The angle sensor gives no angle: a resolver without its excitation, a frame that is missing or not framed as it should be.
+    AngleMissing,
     /// The supply.
     Supply(SupplyFault),
     /// A gate, in the order of [`crate::trace::GATES`], is stuck: on (true) or off.
@@ -92,8 +94,10 @@ impl Spoiler {
         if let Some(sensor) = &mut self.angle {
             sample.angle = sample.angle.map(|angle| sensor.read(kind.is_some(), angle));
         }
-        if kind == Some(Kind::DemandNotFinite) {
-            command.demand.torque_nm = f32::NAN;
+        match kind {
+            Some(Kind::AngleMissing) => sample.angle = None,
+            Some(Kind::DemandNotFinite) => command.demand.torque_nm = f32::NAN,
+            _ => {}
         }
     }
 }

@@ -109,6 +109,7 @@ fn angles(list: &mut Faults<Cause>) {
     list.add("angle-frozen-at-rest", Kind::Angle(AngleFault::Frozen), PUSHED, None, true);
     list.add("angle-reversed-at-rest", Kind::Angle(AngleFault::Reversed), PUSHED, None, true);
     list.add("angle-late", Kind::Angle(AngleFault::Late(5)), LOST, Some(BENT), true);
+    list.add("angle-missing", Kind::AngleMissing, &[Fault::PositionSensor], None, true);
     list.add("angle-off-2deg", Kind::Angle(AngleFault::Jump(2.0)), &[], Some(BENT), true);
 }
 

@@ -57,10 +57,13 @@ const NO_PULSES: &str = "no pulses";
 /// The coordinate of the action from which on there is no torque.
 const COASTING_FROM: f64 = 0.9;
 
-/// The fault at a coordinate. A different machine is no fault here, because it is drawn. Temperature sensors have cases of their own.
+/// The fault at a coordinate. A different machine is no fault here, because it is drawn. Temperature sensors and an angle that is missing have
+/// cases of their own.
 fn fault(coordinate: f64) -> Result<Named<Cause>> {
     let mut list = faults(&Scale::ONE);
-    list.retain(|fault| !matches!(fault.cause, Cause::Machine(..) | Cause::Sensor(..)));
+    let has_its_own =
+        |cause| matches!(cause, Cause::Machine(..) | Cause::Sensor(..) | Cause::Bench(Kind::AngleMissing));
+    list.retain(|fault| !has_its_own(fault.cause));
     let above = (coordinate - SOUND_SHARE) / (1.0 - SOUND_SHARE);
     let others = list.len() - 1;
     let index = if above < 0.0 { 0 } else { 1 + ((above * others as f64) as usize).min(others - 1) };
