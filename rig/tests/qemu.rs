@@ -94,6 +94,14 @@ fn flaws_are_the_same() {
     );
 }
 
+/// Steps of the line behind its filter, whose wide swings are damped; and a start that finds the rotor's angle.
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn a_line_filter_and_a_start_are_the_same() {
+    same("link-steps --line 3,4,30", 0);
+    same("start", 0);
+}
+
 #[test]
 #[ignore = "needs the image and QEMU"]
 fn a_trip_is_the_same() {
