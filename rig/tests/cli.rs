@@ -75,6 +75,10 @@ fn bad_usage_is_refused() {
     refused_in_one_line("run sweep --udc 1e9", &["--udc", "must be from"]);
     refused_in_one_line("run steady --speed 1e12", &["--speed", "must be from"]);
     refused_in_one_line("run sweep --map-error -100", &["--map-error -100", "-90"]);
+    refused_in_one_line(
+        "run sweep --device-drop-told 21,0",
+        &["--device-drop-told 21", "must be from 0 to 20"],
+    );
     refused_in_one_line("run sweep --slope 1e-6", &["--slope", "must be from 12.5 to 25000"]);
     refused("run sweep --udc -5", &["'-5'", "'--udc <UDC>'", "must be a number above 0"]);
     for (bad, word) in [

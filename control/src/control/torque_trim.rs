@@ -303,7 +303,6 @@ mod tests {
             let mean_nm = BANDWIDTH_RAD_S * sixth_s * sixths;
             worst_nm = worst_nm.max((step(f32::from(period)) - mean_nm).abs());
         }
-        std::println!("{worst_nm}");
         assert!(worst_nm < 0.5, "{worst_nm} N·m");
     }
 }

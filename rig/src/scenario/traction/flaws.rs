@@ -76,13 +76,10 @@ impl FromStr for Told {
 }
 
 impl Told {
-    /// The check that a power stage's keys may name them.
-    fn check(self) -> Result<()> {
+    /// The check that a power stage's keys may name them, for the option that says them.
+    fn check(self, option: &str) -> Result<()> {
         let Self([threshold_v, slope_mohm]) = self;
-        within(&[
-            ("threshold of the drop that the drive is told", threshold_v, 0.0, 20.0),
-            ("slope of the drop that the drive is told", slope_mohm, 0.0, 150.0),
-        ])
+        within(&[(option, threshold_v, 0.0, 20.0), (option, slope_mohm, 0.0, 150.0)])
     }
 
     /// The same in mV and hundredths of a mΩ.
@@ -380,7 +377,7 @@ impl FlawOptions {
         ])?;
         let drops = self.device_drop.unwrap_or_default();
         drops.check(parameters.dc_link_nominal_v, machine)?;
-        self.told_drop().check()
+        self.told_drop().check(if self.device_drop_known { "--device-drop" } else { "--device-drop-told" })
     }
 
     /// The drop that the drive is told of.
