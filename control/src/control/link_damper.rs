@@ -6,9 +6,9 @@
 //! wave the voltage follows the link by itself, and so does the torque once the flux has followed; only slow swings remain to be
 //! damped.
 //!
-//! A wide swing, such as a step of the line leaves, meets limits: torque cannot rise above the largest power, so only the half of the swing that lies below
-//! damps. So its middle falls by as much as the swing is wide, and in square wave torque follows quickly. Without this law a step of 200 V at full power and
-//! 3,000 r/min left swings of 220 V behind 3 mH and 4 mF, and the next one tripped.
+//! A wide swing, such as a step of the line leaves, meets limits: torque cannot rise above the largest, so only the half of the swing that lies below
+//! damps. So its middle falls until there is room for both, and in square wave, whose largest torque is the one asked for, torque follows quickly. Without
+//! this law a step of 200 V at full power and 3,000 r/min left swings of 220 V behind 3 mH and 4 mF, and the next one tripped.
 
 use super::Regulated;
 use crate::frames::limit;
@@ -34,7 +34,8 @@ pub struct LinkSwing {
     pub share: f32,
     /// The link with that part of its swing, in V.
     pub udc_v: f32,
-    /// Amplitude of a wide swing, less that of the widest narrow one, as a share of the link's voltage; 0: narrow.
+    /// Amplitude of a wide swing, less that of the widest narrow one, as a share of the link's voltage; 0: narrow. Below 0: its negative, in a mode that can make
+    /// more torque than is asked for, which square wave cannot.
     pub wide: f32,
 }
 
@@ -46,7 +47,8 @@ impl LinkSwing {
             return 0.0;
         }
         let magnitude = torque_nm.abs();
-        let middle_nm = magnitude / (1.0 + gain * self.wide);
+        let most_nm = if self.wide < 0.0 { largest_nm } else { magnitude };
+        let middle_nm = limit(most_nm / (1.0 + gain * self.wide.abs()), 0.0, magnitude);
         limit(middle_nm * (1.0 + gain * self.share), 0.0, largest_nm) - magnitude
     }
 }
@@ -75,15 +77,20 @@ impl LinkDamper {
         let share = udc_v / self.slow_v - 1.0;
         let faded = self.amplitude * (1.0 - FADES_RAD_S * period_s);
         self.amplitude = if share.abs() > faded { share.abs() } else { faded };
-        let is_wide = self.amplitude > CALM;
-        self.share = if follows == Regulated::Angle {
-            let followed = if is_wide { WIDE_SHARE } else { SQUARE_SHARE };
-            self.share + followed * omega.abs() * period_s * (share - self.share)
-        } else {
-            share
+        let excess = self.amplitude - CALM;
+        let (share, wide) = match (follows, excess > 0.0) {
+            (Regulated::Angle, true) => (self.followed(WIDE_SHARE * omega, period_s, share), excess),
+            (Regulated::Angle, false) => (self.followed(SQUARE_SHARE * omega, period_s, share), 0.0),
+            (_, is_wide) => (share, if is_wide { -excess } else { 0.0 }),
         };
-        let wide = if is_wide { self.amplitude - CALM } else { 0.0 };
-        LinkSwing { share: self.share, wide, udc_v: self.slow_v * (1.0 + self.share) }
+        self.share = share;
+        LinkSwing { share, wide, udc_v: self.slow_v * (1.0 + share) }
+    }
+
+    /// The share that has followed `share` for a time in s with this bandwidth, in rad/s, of either sign.
+    #[inline(always)]
+    fn followed(&self, bandwidth: f32, period_s: f32, share: f32) -> f32 {
+        self.share + bandwidth.abs() * period_s * (share - self.share)
     }
 }
 
