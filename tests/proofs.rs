@@ -121,7 +121,7 @@ fn every_word_of_a_command_comes_back_as_it_was() {
         command.inspect(|command| assert_eq!(command.encode(Scales::USUAL).ok(), Some(payload))).is_some()
     };
     let mut taken = 0;
-    for levels in 0..1_u32 << 7 {
+    for levels in 0..1_u32 << 8 {
         let is_set = |bit: u32| levels >> bit & 1 == 1;
         let command = Command {
             enable: is_set(0),
@@ -131,13 +131,14 @@ fn every_word_of_a_command_comes_back_as_it_was() {
             charge: is_set(4),
             discharge: is_set(5),
             acknowledge: is_set(6),
+            calibrate: is_set(7),
             torque_nm: 0.0,
         };
         let levels = command.encode(Scales::USUAL).unwrap();
         assert_eq!(Command::decode(levels, Scales::USUAL), Some(command));
         taken += (0..1_u64 << 16).filter(|torque| comes_back(Payload(levels.0 | torque << 16))).count();
     }
-    assert_eq!(taken, 128 * 60_001, "torques of −3,000 to 3,000 N·m by tenths, and no other");
+    assert_eq!(taken, 256 * 60_001, "torques of −3,000 to 3,000 N·m by tenths, and no other");
     // The words that a command leaves free.
     for word in 1..1_u64 << 16 {
         for shift in [32, 48] {

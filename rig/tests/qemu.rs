@@ -196,14 +196,14 @@ fn an_acknowledged_fault_is_the_same() {
 }
 
 /// The same scripts over the protocol: the same frames, telemetry and pulses.
-fn same_talk(system: &str, name: &str) {
+fn same_talk(system: &str, name: &str, flaws: &[&str]) {
     let zs9 = std::env::var_os("TRACTIVE_ZS9_IMAGE").filter(|_| system == "zs9");
     let folder = tempfile::tempdir().unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts").join(name);
     for on in ["host", "qemu"] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tractive-rig"));
         command.envs(zs9.iter().map(|image| ("TRACTIVE_IMAGE", image)));
-        command.args(["talk", "--system", system]).arg(&script);
+        command.args(["talk", "--system", system]).arg(&script).args(flaws);
         command.args(["--on", on, "--out"]).arg(folder.path().join(on));
         let output = command.output().unwrap();
         assert!(output.status.success(), "{name} on {on}: {}", String::from_utf8_lossy(&output.stderr));
@@ -218,19 +218,25 @@ fn same_talk(system: &str, name: &str) {
 #[test]
 #[ignore = "needs the image and QEMU"]
 fn a_round_trip_over_the_protocol_is_the_same() {
-    same_talk("pmasynrm", "round-trip.talk");
+    same_talk("pmasynrm", "round-trip.talk", &[]);
 }
 
 #[test]
 #[ignore = "needs the image and QEMU"]
 fn hostile_frames_are_treated_the_same() {
-    same_talk("pmasynrm", "hostile.talk");
+    same_talk("pmasynrm", "hostile.talk", &[]);
 }
 
 #[test]
 #[ignore = "needs the image and QEMU"]
 fn both_motors_over_the_protocol_are_the_same() {
-    same_talk("zs9", "zs9.talk");
+    same_talk("zs9", "zs9.talk", &[]);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU"]
+fn a_zero_is_calibrated_the_same() {
+    same_talk("pmasynrm", "calibrate.talk", &["--angle-error", "8"]);
 }
 
 /// The same experiment: the same machine folder, and over the protocol the same frames.

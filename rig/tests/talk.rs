@@ -54,6 +54,39 @@ fn the_drive_goes_from_standstill_to_2000_rpm_and_back() {
     }
 }
 
+/// A zero that is 8° off is found, and refused when the machine cannot show it; the script says when.
+#[test]
+fn the_zero_of_the_angle_is_calibrated_either_way() {
+    for error in ["8", "-8"] {
+        let folder = tempfile::tempdir().unwrap();
+        let (script_of, out) = (folder.path().join("zero.talk"), folder.path().join("out"));
+        let text = std::fs::read_to_string(script("calibrate.talk")).unwrap();
+        let found = if error == "8" { "-8" } else { "8" };
+        std::fs::write(&script_of, text.replace("angle_zero_deg -8", &format!("angle_zero_deg {found}")))
+            .unwrap();
+        let mut talk = rig();
+        talk.arg(&script_of).args(["--angle-error", error, "--out"]).arg(&out);
+        let output = talk.output().unwrap();
+        assert!(output.status.success(), "{error}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+/// Noise of the current sensors shows before anything flows.
+#[test]
+fn the_flaws_of_real_are_in_a_talk_too() {
+    for (system, column) in [("pmasynrm", "current_a"), ("zs9", "current1_a")] {
+        let folder = tempfile::tempdir().unwrap();
+        let (script, out) = (folder.path().join("rest.talk"), folder.path().join("out"));
+        std::fs::write(&script, "wait 0.1\nend\n").unwrap();
+        let mut talk = rig();
+        let output =
+            talk.args(["--system", system, "--real", "--out"]).arg(&out).arg(&script).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let currents = numbers(&out.join("telemetry.csv"), column);
+        assert!(currents.iter().any(|current_a| *current_a > 0.0), "{system}");
+    }
+}
+
 #[test]
 fn hostile_frames_are_rejected_and_counted_and_silence_ends_the_drive() {
     let out = tempfile::tempdir().unwrap();

@@ -8,7 +8,7 @@ use crate::ports::{DriveCommand, DualDriveCommand, DualReport, MotorDemand, Repo
 use crate::time::{Clock, Instant};
 
 /// Between the PMaSynRM drive's operator and its control interrupt.
-pub type OperatorMailboxes = Mailboxes<DriveCommand, Report, 7, 14>;
+pub type OperatorMailboxes = Mailboxes<DriveCommand, Report, 7, 15>;
 /// Between the ZS9's operator and its control interrupt.
 pub type DualOperatorMailboxes = Mailboxes<DualDriveCommand, DualReport, 7, 17>;
 
@@ -34,9 +34,9 @@ const FROM: usize = 0;
 
 impl Words<7> for Timed<DriveCommand> {
     fn to_words(self) -> [u32; 7] {
-        let DriveCommand { enable, demand, window, acknowledge, warmth } = self.command;
-        let flags = u32::from(enable) | u32::from(demand.slew_limited) << 1 | u32::from(acknowledge) << 8;
-        let flags = flags | u32::from(warmth.word()) << 16;
+        let DriveCommand { enable, demand, window, acknowledge, warmth, calibrate } = self.command;
+        let flags = u32::from(enable) | u32::from(demand.slew_limited) << 1 | u32::from(calibrate) << 2;
+        let flags = flags | u32::from(acknowledge) << 8 | u32::from(warmth.word()) << 16;
         [
             self.from.0,
             flags,
@@ -62,6 +62,7 @@ impl Words<7> for Timed<DriveCommand> {
                 },
                 acknowledge: (flags >> 8) as u8,
                 warmth: Warmth::from_word((flags >> 16) as u16),
+                calibrate: flags & 4 != 0,
             },
             from: Instant(from),
         }
@@ -103,16 +104,16 @@ impl Words<7> for Timed<DualDriveCommand> {
     }
 }
 
-impl Words<14> for Observation<Report> {
+impl Words<15> for Observation<Report> {
     #[inline]
-    fn to_words(self) -> [u32; 14] {
-        let [a, b, c, d, e, f, g, h, i, j, k, l, m] = self.report.to_words();
-        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l, m]
+    fn to_words(self) -> [u32; 15] {
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n] = self.report.to_words();
+        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l, m, n]
     }
 
-    fn from_words(words: [u32; 14]) -> Self {
-        let [at, a, b, c, d, e, f, g, h, i, j, k, l, m] = words;
-        let report = Report::from_words([a, b, c, d, e, f, g, h, i, j, k, l, m]);
+    fn from_words(words: [u32; 15]) -> Self {
+        let [at, report @ ..] = words;
+        let report = Report::from_words(report);
         Self { at: Instant(at), report }
     }
 }
@@ -228,6 +229,7 @@ fn slot_ticks(clock: &Clock) -> u32 {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
+    use crate::frames::Angle;
 
     #[test]
     fn a_slot_is_a_millisecond_at_every_control_rate() {
@@ -251,7 +253,7 @@ mod tests {
 
     #[test]
     fn a_command_of_the_drive_comes_back_word_for_word() {
-        for [enable, slew_limited, a, b, c, ..] in flags() {
+        for [enable, slew_limited, a, b, c, calibrate, ..] in flags() {
             let acknowledge = u8::from(a) | u8::from(b) << 7 | u8::from(c) << 3;
             let command = DriveCommand {
                 enable,
@@ -264,6 +266,7 @@ mod tests {
                 },
                 acknowledge,
                 warmth: Warmth::from_word(if a { 0xA5C3 } else { 0x5A3C }),
+                calibrate,
             };
             let timed = Timed { command, from: INSTANT };
             assert_eq!(Timed::<DriveCommand>::from_words(timed.to_words()), timed);
@@ -295,7 +298,7 @@ mod tests {
 
     #[test]
     fn an_observation_comes_back_word_for_word() {
-        for [speed_known, a, b, first, second, ..] in flags() {
+        for [speed_known, a, b, first, second, calibrating, ..] in flags() {
             let acknowledged = u8::from(a) | u8::from(b) << 7;
             for code in 0..8 {
                 let [torque_nm, id_a, iq_a, voltage_v, omega] = [1.0, -2.0, 3.0, 4.0, -5.0];
@@ -315,6 +318,8 @@ mod tests {
                     speed_known,
                     acknowledged,
                     mode,
+                    angle_zero: Angle(0x8123_4567),
+                    calibrating,
                 };
                 let observed = Observation { at: INSTANT, report };
                 assert_eq!(Observation::<Report>::from_words(observed.to_words()), observed);

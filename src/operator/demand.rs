@@ -56,7 +56,18 @@ pub trait Demands: Copy {
     /// The present demands.
     fn told(&self) -> Self::Status;
     /// The command to the drive.
-    fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> Self::DriveCommand;
+    fn command(&self, orders: &Orders, settings: &Settings) -> Self::DriveCommand;
+}
+
+/// The operator's orders to the drive, beside the demands.
+#[derive(Clone, Copy, Debug)]
+pub struct Orders {
+    /// Gates may pulse.
+    pub enable: bool,
+    /// The zero of the position sensor is to be calibrated.
+    pub calibrate: bool,
+    /// Number of the last acknowledge.
+    pub acknowledge: u8,
 }
 
 /// The PMaSynRM drive's demand: a torque.
@@ -118,8 +129,9 @@ impl Demands for TorqueDemand {
 
     #[inline]
     fn levels(request: &Request) -> Levels {
-        let Request { enable, with_torque, off, coast, charge, discharge, acknowledge, .. } = *request;
-        Levels { enable, with_torque, off, coast, charge, discharge, acknowledge }
+        let Request { enable, with_torque, off, coast, charge, discharge, acknowledge, calibrate, .. } =
+            *request;
+        Levels { enable, with_torque, off, coast, charge, discharge, acknowledge, calibrate }
     }
 
     #[inline]
@@ -205,13 +217,15 @@ impl Demands for TorqueDemand {
     }
 
     #[inline]
-    fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DriveCommand {
+    fn command(&self, orders: &Orders, settings: &Settings) -> DriveCommand {
+        let Orders { enable, calibrate, acknowledge } = *orders;
         DriveCommand {
             enable,
             demand: Demand { torque_nm: self.torque_nm(), slew_limited: true },
             window: self.line.window(&self.limits(settings), settings.ratings),
             acknowledge,
             warmth: self.warmth,
+            calibrate,
         }
     }
 }
@@ -328,7 +342,8 @@ mod tests {
         let mut demand = TorqueDemand { given_nm: 100.0, ..TorqueDemand::AT_REST };
         demand.derate(0.5, warmth);
         demand.drop();
-        assert_eq!((demand.given_nm, demand.command(false, 0, &settings).warmth), (0.0, warmth));
+        let orders = Orders { enable: false, calibrate: false, acknowledge: 0 };
+        assert_eq!((demand.given_nm, demand.command(&orders, &settings).warmth), (0.0, warmth));
         let most_nm = demand.limits(&settings).motoring_nm;
         assert_eq!(most_nm, 0.5 * Limits::rated(settings.ratings).motoring_nm);
     }

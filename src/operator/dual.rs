@@ -1,6 +1,7 @@
 //! The ZS9's request: a torque or a speed for each motor, and a voltage for the link. Both motors share one state machine, so a fault, a stop and an
 //! enabling edge each apply to both.
 
+use super::Orders;
 use super::demand::wanted_nm;
 use super::set_point::SetPoint;
 use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
@@ -262,7 +263,8 @@ impl Demands for DualDemands {
         self.ramps.each_ref().map(DemandRamp::demand)
     }
 
-    fn command(&self, enable: bool, acknowledge: u8, settings: &Settings) -> DualDriveCommand {
+    fn command(&self, orders: &Orders, settings: &Settings) -> DualDriveCommand {
+        let Orders { enable, acknowledge, .. } = *orders;
         let smaller = |limits: MotorLimits| {
             if limits.motoring_nm < limits.braking_nm { limits.motoring_nm } else { limits.braking_nm }
         };

@@ -5,8 +5,8 @@ mod commands;
 use super::demand;
 use super::line::{Discharge, Outcome, Precharge};
 use super::{
-    ACKNOWLEDGE_S, Configuration, Demands, Feedback, Input, Output, Refusal, SELF_TEST_S, Seen, Settings,
-    Situation, State, Status, Switches, health, line,
+    ACKNOWLEDGE_S, Configuration, Demands, Feedback, Input, Orders, Output, Refusal, SELF_TEST_S, Seen,
+    Settings, Situation, State, Status, Switches, health, line,
 };
 use crate::control::Warmth;
 use crate::protection::{FailedCheck, Fault, SafeState, Trip};
@@ -61,6 +61,7 @@ struct Edges {
     charge: bool,
     discharge: bool,
     acknowledge: bool,
+    calibrate: bool,
 }
 
 impl<D: Demands> Operator<D> {
@@ -70,7 +71,7 @@ impl<D: Demands> Operator<D> {
             phase: Phase::Init,
             demands: D::AT_REST,
             // A level that is set from the beginning is not an edge.
-            last: Edges { enable: true, charge: true, discharge: true, acknowledge: true },
+            last: Edges { enable: true, charge: true, discharge: true, acknowledge: true, calibrate: true },
             bad_values: None,
             refusal: None,
             refusals: 0,
@@ -112,8 +113,10 @@ impl<D: Demands> Operator<D> {
         self.obey(input, &situation, settings);
         self.shape(input, settings);
         let (enable, switches) = self.outputs(&situation, settings);
+        let calibrate = D::levels(input.request).calibrate && self.state() == State::Enabled;
+        let orders = Orders { enable, calibrate, acknowledge: self.acknowledge };
         Output {
-            command: self.demands.command(enable, self.acknowledge, settings),
+            command: self.demands.command(&orders, settings),
             status: Status {
                 state: self.state(),
                 trip: match self.phase {

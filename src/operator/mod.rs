@@ -26,7 +26,7 @@ mod slot;
 mod status;
 mod train;
 
-pub use demand::{Demands, TorqueDemand};
+pub use demand::{Demands, Orders, TorqueDemand};
 pub use dual::{DualDemands, DualRequest, MotorLimits, MotorRequest, Wanted};
 pub use ramp::{Ramp, Rates};
 pub use request::{Configuration, Feedback, Levels, Limits, Request, Seen};

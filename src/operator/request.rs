@@ -28,6 +28,8 @@ pub struct Request {
     pub discharge: bool,
     /// Rising edge: acknowledge the fault.
     pub acknowledge: bool,
+    /// `true`, while the gates pulse without torque: calibrate the zero of the position sensor.
+    pub calibrate: bool,
     /// Torque demand, in N·m; positive turns the rotor forward.
     pub torque_nm: f32,
     /// Limits within the machine's ratings.
@@ -45,6 +47,7 @@ impl Request {
             charge: false,
             discharge: false,
             acknowledge: false,
+            calibrate: false,
             torque_nm: 0.0,
             limits: Limits::rated(ratings),
         }
@@ -69,6 +72,8 @@ pub struct Levels {
     pub discharge: bool,
     /// Rising edge: acknowledge.
     pub acknowledge: bool,
+    /// Calibrate the zero of the position sensor; no drive with two has it.
+    pub calibrate: bool,
 }
 
 impl Levels {
@@ -81,6 +86,7 @@ impl Levels {
         charge: false,
         discharge: false,
         acknowledge: false,
+        calibrate: false,
     };
 }
 
@@ -199,10 +205,10 @@ pub(super) fn bits<const N: usize>(flags: [bool; N]) -> u32 {
 
 impl Words<7> for Request {
     fn to_words(self) -> [u32; 7] {
-        let Self { enable, with_torque, off, coast, charge, discharge, acknowledge, torque_nm, limits } =
-            self;
+        let Self { enable, with_torque, off, coast, charge, discharge, acknowledge, calibrate, .. } = self;
+        let Self { torque_nm, limits, .. } = self;
         let Limits { motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v } = limits;
-        let flags = bits([enable, with_torque, off, coast, charge, discharge, acknowledge]);
+        let flags = bits([enable, with_torque, off, coast, charge, discharge, acknowledge, calibrate]);
         let [torque, motoring, braking, speed, low, high] =
             [torque_nm, motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v].map(f32::to_bits);
         [flags, torque, motoring, braking, speed, low, high]
@@ -221,6 +227,7 @@ impl Words<7> for Request {
             charge: flag(4),
             discharge: flag(5),
             acknowledge: flag(6),
+            calibrate: flag(7),
             torque_nm,
             limits: Limits { motoring_nm, braking_nm, speed_rad_s, link_low_v, link_high_v },
         }
@@ -276,7 +283,7 @@ mod tests {
 
     #[test]
     fn requests_and_feedback_survive_as_words() {
-        for bit in 0..7 {
+        for bit in 0..8 {
             let words = [1 << bit, 1, 2, 3, 4, 5, 6];
             assert_eq!(Request::from_words(words).to_words(), words);
         }

@@ -94,6 +94,8 @@ named! {
         RequestNotFinite => "request_not_finite",
         /// A limit lies outside the machine's ratings; the previous limits remain in force.
         LimitOutOfRange => "limit_out_of_range",
+        /// The zero of the position sensor cannot be calibrated: the gates do not pulse, or the drive is about to stop.
+        NotEnabled => "not_enabled",
     }
 }
 

@@ -55,6 +55,8 @@ pub struct DriveCommand {
     pub acknowledge: u8,
     /// The warmth of the machine, if its temperatures are measured.
     pub warmth: Warmth,
+    /// The position sensor's zero is to be calibrated, as long as no torque is demanded.
+    pub calibrate: bool,
 }
 
 impl DriveCommand {
@@ -65,6 +67,7 @@ impl DriveCommand {
         window: LinkWindow::OPEN,
         acknowledge: 0,
         warmth: Warmth::NONE,
+        calibrate: false,
     };
 }
 

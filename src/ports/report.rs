@@ -1,6 +1,7 @@
 //! The control tasks' reports of a period, for traces, operator and telemetry.
 
 use crate::cell::Words;
+use crate::frames::Angle;
 use crate::modulation::Mode;
 use crate::nine_switch::Scheme;
 use crate::protection::{Trip, trip_from_words, trip_to_words};
@@ -35,6 +36,10 @@ pub struct Report {
     pub acknowledged: u8,
     /// Pulse pattern for which the voltage was made.
     pub mode: Mode,
+    /// Correction of the position sensor's zero, electrical: the drive adds it to the sensor's angle.
+    pub angle_zero: Angle,
+    /// `true` while that is being found.
+    pub calibrating: bool,
 }
 
 impl Report {
@@ -44,11 +49,13 @@ impl Report {
     }
 }
 
-impl Words<13> for Report {
+impl Words<14> for Report {
     #[inline]
-    fn to_words(self) -> [u32; 13] {
+    fn to_words(self) -> [u32; 14] {
         let [code, value, limit, at] = trip_to_words(self.trip);
-        let flags = u32::from(self.acknowledged) | u32::from(self.speed_known) << 8;
+        let flags = u32::from(self.acknowledged)
+            | u32::from(self.speed_known) << 8
+            | u32::from(self.calibrating) << 9;
         let code = code | flags << 16 | (self.mode as u32) << 26;
         [
             self.torque_nm.to_bits(),
@@ -64,12 +71,13 @@ impl Words<13> for Report {
             self.udc_v.to_bits(),
             self.current_a.to_bits(),
             self.flowing_nm.to_bits(),
+            self.angle_zero.0,
         ]
     }
 
-    fn from_words(words: [u32; 13]) -> Self {
-        let [torque, id, iq, voltage, omega, map_error, code, value, limit, at, udc, current, flowing] =
-            words;
+    fn from_words(words: [u32; 14]) -> Self {
+        let [torque, id, iq, voltage, omega, map_error, code, value, limit, at, measured @ ..] = words;
+        let [udc, current, flowing, angle_zero] = measured;
         Self {
             torque_nm: f32::from_bits(torque),
             id_a: f32::from_bits(id),
@@ -84,6 +92,8 @@ impl Words<13> for Report {
             speed_known: code >> 24 & 1 != 0,
             acknowledged: (code >> 16) as u8,
             mode: Mode::from_code(code >> 26),
+            angle_zero: Angle(angle_zero),
+            calibrating: code >> 25 & 1 != 0,
         }
     }
 }

@@ -20,6 +20,7 @@ const TORQUE: Signal = Signal::physical("torque_nm", "N.m", 16, 0.1, TORQUE_NM).
 pub(super) const CHARGE: Signal = Signal::flag("charge", 32);
 pub(super) const DISCHARGE: Signal = Signal::flag("discharge", 33);
 pub(super) const ACKNOWLEDGE: Signal = Signal::flag("acknowledge", 34);
+const CALIBRATE: Signal = Signal::flag("calibrate", 35);
 
 pub(super) const MOTORING: Signal =
     Signal::physical("motoring_nm", "N.m", 16, 0.1, LIMIT_NM).of(Quantity::Torque);
@@ -41,7 +42,7 @@ pub const COMMAND: Message = Message::new(
     0x101,
     1,
     10,
-    &[ENABLE, WITH_TORQUE, OFF, COAST, TORQUE, CHARGE, DISCHARGE, ACKNOWLEDGE],
+    &[ENABLE, WITH_TORQUE, OFF, COAST, TORQUE, CHARGE, DISCHARGE, ACKNOWLEDGE, CALIBRATE],
 )
 .telling(36, &[Quantity::Torque]);
 
@@ -57,7 +58,7 @@ pub const LINK_LIMITS: Message =
 pub const PARAMETER_REQUEST: Message =
     Message::new("PARAMETER_REQUEST", 0x104, 4, 0, &[WRITE, PARAMETER, VALUE]);
 
-/// A command's levels.
+/// A command's levels, without the one for a single motor.
 #[inline(never)]
 pub(super) fn put_levels(levels: &Levels) -> Payload {
     let mut payload = Payload::default();
@@ -85,6 +86,7 @@ pub(super) fn levels(payload: Payload) -> Levels {
         charge: CHARGE.is_set(payload),
         discharge: DISCHARGE.is_set(payload),
         acknowledge: ACKNOWLEDGE.is_set(payload),
+        calibrate: false,
     }
 }
 
@@ -106,6 +108,8 @@ pub struct Command {
     pub discharge: bool,
     /// Acknowledge the fault, by a rising edge.
     pub acknowledge: bool,
+    /// Calibrate the zero of the position sensor, for as long as this is set and there is no torque.
+    pub calibrate: bool,
     /// Torque, in N·m.
     pub torque_nm: f32,
 }
@@ -120,14 +124,16 @@ impl Command {
         charge: false,
         discharge: false,
         acknowledge: false,
+        calibrate: false,
         torque_nm: 0.0,
     };
 
     /// As a frame's content, without its mark.
     pub fn encode(&self, scales: Scales) -> Result<Payload, OutOfRange> {
-        let Self { enable, with_torque, off, coast, charge, discharge, acknowledge, .. } = *self;
-        let levels = Levels { enable, with_torque, off, coast, charge, discharge, acknowledge };
+        let Self { enable, with_torque, off, coast, charge, discharge, acknowledge, calibrate, .. } = *self;
+        let levels = Levels { enable, with_torque, off, coast, charge, discharge, acknowledge, calibrate };
         let mut payload = put_levels(&levels);
+        CALIBRATE.put_raw(&mut payload, calibrate.into());
         TORQUE.put_on(scales, &mut payload, self.torque_nm)?;
         Ok(payload)
     }
@@ -135,9 +141,10 @@ impl Command {
     /// From a frame's content without its mark; `None` if a value is out of its range or an unused bit is set.
     pub fn decode(payload: Payload, scales: Scales) -> Option<Self> {
         COMMAND.is_tidy(payload).then_some(())?;
-        let Levels { enable, with_torque, off, coast, charge, discharge, acknowledge } = levels(payload);
+        let Levels { enable, with_torque, off, coast, charge, discharge, acknowledge, .. } = levels(payload);
+        let calibrate = CALIBRATE.is_set(payload);
         let torque_nm = TORQUE.get_on(scales, payload)?;
-        Some(Self { enable, with_torque, off, coast, charge, discharge, acknowledge, torque_nm })
+        Some(Self { enable, with_torque, off, coast, charge, discharge, acknowledge, calibrate, torque_nm })
     }
 }
 

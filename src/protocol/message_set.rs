@@ -25,7 +25,7 @@ pub trait MessageSet: Copy + 'static {
     /// The messages to it: the command first.
     const TO_DRIVE: &'static [&'static Message];
     /// The messages from it: status, three of measurements, the fault's value and limit, counters, the answer about a parameter; and, for a drive
-    /// that has them, a fourth of measurements and the temperatures.
+    /// that has them, a fourth of measurements, the temperatures, and a fifth of measurements.
     const FROM_DRIVE: &'static [&'static Message];
     /// The first frame of a message, or the first after a silence: it only sets the counter.
     const GREETING: Self::Content;

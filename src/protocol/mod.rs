@@ -40,7 +40,7 @@ pub use receiver::Reject;
 pub use scales::{Quantity, Scales};
 pub use signal::{Kind, OutOfRange, Payload, Signal};
 pub use telemetry::{
-    COUNTERS, CURRENTS, Counts, FAULT_LIMIT, FAULT_VALUE, Listening, MOTION, Measured, Outcome,
+    ANGLE_ZERO, COUNTERS, CURRENTS, Counts, FAULT_LIMIT, FAULT_VALUE, Listening, MOTION, Measured, Outcome,
     PARAMETER_ANSWER, ParameterAnswer, Pattern, STATUS, StatusFrame, TEMPERATURES, TORQUE_ESTIMATE,
     TemperaturesFrame, VOLTAGES, trip_frames, trip_number,
 };
@@ -49,7 +49,7 @@ pub use telemetry::{
 pub const TO_DRIVE: [&Message; 4] = [&COMMAND, &LIMITS, &LINK_LIMITS, &PARAMETER_REQUEST];
 
 /// The messages from the drive.
-pub const FROM_DRIVE: [&Message; 10] = [
+pub const FROM_DRIVE: [&Message; 11] = [
     &STATUS,
     &MOTION,
     &CURRENTS,
@@ -60,6 +60,7 @@ pub const FROM_DRIVE: [&Message; 10] = [
     &PARAMETER_ANSWER,
     &TORQUE_ESTIMATE,
     &TEMPERATURES,
+    &ANGLE_ZERO,
 ];
 
 pub use traction::{Content, Traction};

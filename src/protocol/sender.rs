@@ -21,6 +21,8 @@ const ANSWER: usize = 7;
 const MORE: usize = 8;
 /// The temperatures, if a drive has them.
 const TEMPERATURES: usize = 9;
+/// A fifth message of measurements, if a drive has one.
+const ANGLE_ZERO: usize = 10;
 
 /// Counters of all messages, and the place in the cycle.
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +30,7 @@ pub struct Sender<D> {
     slot: u32,
     page: u32,
     answer: Option<ParameterAnswer>,
-    counters: [Counter; 10],
+    counters: [Counter; 11],
     message_set: core::marker::PhantomData<D>,
 }
 
@@ -39,7 +41,7 @@ impl<D: MessageSet> Sender<D> {
             slot: 0,
             page: 0,
             answer: None,
-            counters: [Counter::new(); 10],
+            counters: [Counter::new(); 11],
             message_set: core::marker::PhantomData,
         }
     }
@@ -74,6 +76,7 @@ impl<D: MessageSet> Sender<D> {
             (8, 1) if D::FROM_DRIVE.len() > TEMPERATURES => {
                 (TEMPERATURES, TemperaturesFrame::from(temperatures?).encode())
             }
+            (8, 2) if D::FROM_DRIVE.len() > ANGLE_ZERO => (ANGLE_ZERO, D::measured(measured, 4, scales)),
             (8, 3) => {
                 let [value, _] = trip_frames(trip?);
                 (FAULT_VALUE, value)

@@ -109,6 +109,7 @@ impl MessageSet for Traction {
             charge: command.charge,
             discharge: command.discharge,
             acknowledge: command.acknowledge,
+            calibrate: fresh && command.calibrate,
             torque_nm: if fresh { command.torque_nm } else { 0.0 },
             ..idle
         }
@@ -133,6 +134,8 @@ impl MessageSet for Traction {
             voltage_v: Some(report.voltage_v),
             frequency_hz: Some(report.omega / core::f32::consts::TAU),
             temperature_c: temperatures.map(|temperatures| temperatures.winding_c),
+            angle_zero_deg: Some(report.angle_zero.signed_radians().to_degrees()),
+            calibrating: report.calibrating,
         };
         (measured, report.mode)
     }
@@ -142,6 +145,7 @@ impl MessageSet for Traction {
             0 => measured.motion(scales),
             1 => measured.currents(scales),
             3 => measured.torque_estimate(scales),
+            4 => measured.angle_zero(),
             _ => measured.voltages(scales),
         }
     }
@@ -151,6 +155,7 @@ impl MessageSet for Traction {
 mod tests {
     use super::*;
     use crate::built_in::traction::BUILT_IN;
+    use crate::frames::Angle;
 
     fn told(report: Option<&Report>) -> (Measured, Mode) {
         Traction::observed(report, None, &BUILT_IN.ratings)
@@ -163,6 +168,8 @@ mod tests {
         let [id_a, iq_a, voltage_v] = [5.0, 6.0, 7.0];
         let mode = Mode::Square;
         let known = Report { speed_known: true, omega, torque_nm, flowing_nm, ..Report::default() };
+        let (angle_zero, calibrating) = (Angle::DEG_90, true);
+        let known = Report { angle_zero, calibrating, ..known };
         let report = Report { udc_v, current_a, id_a, iq_a, voltage_v, mode, ..known };
         let (measured, told_mode) = told(Some(&report));
         let rpm = measured.speed_rpm.unwrap();
@@ -177,6 +184,8 @@ mod tests {
             id_ref_a: Some(5.0),
             iq_ref_a: Some(6.0),
             voltage_v: Some(7.0),
+            angle_zero_deg: Some(90.0),
+            calibrating: true,
             ..Measured::default()
         };
         assert_eq!((rest, told_mode), (expected, mode));
@@ -195,12 +204,13 @@ mod tests {
             Command { coast: true, ..at_rest },
             Command { charge: true, ..at_rest },
             Command { discharge: true, ..at_rest },
+            Command { calibrate: true, ..at_rest },
         ];
         assert_eq!(said.take(Content::Command(at_rest)), Taken::Command { at_rest: true });
         for command in others {
             assert_eq!(said.take(Content::Command(command)), Taken::Command { at_rest: false });
         }
-        assert_eq!(said.command, others[4]);
+        assert_eq!(said.command, others[5]);
         said.rest();
         assert_eq!(said.command, Command::AT_REST);
     }

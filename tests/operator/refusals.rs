@@ -10,6 +10,7 @@ const ENABLE: Set = |request, level| request.enable = level;
 const CHARGE: Set = |request, level| request.charge = level;
 const DISCHARGE: Set = |request, level| request.discharge = level;
 const ACKNOWLEDGE: Set = |request, level| request.acknowledge = level;
+const CALIBRATE: Set = |request, level| request.calibrate = level;
 
 /// The command's edge is refused for this reason, and nothing else happens.
 fn refused(world: &mut World, set: Set, reason: Refusal) {
@@ -209,6 +210,30 @@ fn no_contactors() {
         world.until(State::Ready);
         refused(&mut world, set, Refusal::NoContactors);
     }
+}
+
+/// The order is passed on while the gates pulse without torque and the level is set, and at no other time.
+#[test]
+fn a_zero_is_calibrated_without_torque_alone() {
+    for mut world in [World::new(), World::ready(), World::charged()] {
+        refused(&mut world, CALIBRATE, Refusal::NotEnabled);
+        assert!(!world.output().command.calibrate);
+    }
+    let mut world = World::running();
+    refused(&mut world, CALIBRATE, Refusal::TorqueNotZero);
+    assert!(!world.output().command.calibrate);
+    let mut world = World::enabled();
+    assert!(!world.output().command.calibrate);
+    world.request.calibrate = true;
+    assert!(world.slot().command.calibrate && world.refusal().is_none());
+    world.request.torque_nm = 50.0;
+    world.slots(5);
+    assert!(!world.output().command.calibrate);
+    world.request.torque_nm = 0.0;
+    world.slots(500);
+    assert!(world.output().command.calibrate);
+    world.request.coast = true;
+    assert!(!world.slot().command.calibrate);
 }
 
 #[test]

@@ -130,7 +130,7 @@ fn a_wrong_counter_is_no_sign_of_life() {
 fn out_of_range_is_rejected_whole_in_every_message() {
     let bad_torque = |raw: u64| Payload(raw << 16);
     for (stream, contents) in [
-        (&COMMAND, vec![bad_torque(30_001), bad_torque(0x8000), bad_torque(0x7FFF), Payload(1 << 35)]),
+        (&COMMAND, vec![bad_torque(30_001), bad_torque(0x8000), bad_torque(0x7FFF), Payload(1 << 40)]),
         (&LIMITS, vec![Payload(30_001 << 16 | 1 << 48), Payload(0), Payload(1 << 12 | 1 << 48)]),
         (&LINK_LIMITS, vec![Payload(2 << 16 | 1 << 32), Payload(0), Payload(65_001 << 32)]),
         (

@@ -7,9 +7,9 @@ use tractive::drive::dual::Settings;
 use tractive::machine::{Ratings, Tables};
 use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
-    COMMAND, CURRENTS, Command, Content, FROM_DRIVE, FROM_ZS9, Frame, Kind, LIMITS, LINK_LIMITS, LinkLimits,
-    MOTION, Measured, Message, Payload, Quantity, Receiver, Reject, Scales, Signal, TO_DRIVE, TO_ZS9,
-    TORQUE_ESTIMATE, TorqueLimits, VOLTAGES,
+    ANGLE_ZERO, COMMAND, CURRENTS, Command, Content, FROM_DRIVE, FROM_ZS9, Frame, Kind, LIMITS, LINK_LIMITS,
+    LinkLimits, MOTION, Measured, Message, Payload, Quantity, Receiver, Reject, Scales, Signal, TO_DRIVE,
+    TO_ZS9, TORQUE_ESTIMATE, TorqueLimits, VOLTAGES,
 };
 use tractive_tablegen::MachineFolder;
 
@@ -279,6 +279,8 @@ fn measurements_come_through() {
         voltage_v: Some(26.66),
         frequency_hz: Some(362.15),
         temperature_c: None,
+        angle_zero_deg: Some(-123.45),
+        calibrating: true,
     };
     let mut found = Measured::default();
     for (message, content) in [
@@ -286,6 +288,7 @@ fn measurements_come_through() {
         (&CURRENTS, sent.currents(scales)),
         (&VOLTAGES, sent.voltages(scales)),
         (&TORQUE_ESTIMATE, sent.torque_estimate(scales)),
+        (&ANGLE_ZERO, sent.angle_zero()),
     ] {
         found.merge(message, content, scales);
     }
@@ -301,6 +304,8 @@ fn measurements_come_through() {
     near(found.iq_ref_a, sent.iq_ref_a, 0.01);
     near(found.voltage_v, sent.voltage_v, 0.01);
     near(found.frequency_hz, sent.frequency_hz, 0.05);
+    near(found.angle_zero_deg, sent.angle_zero_deg, 0.01);
+    assert!(found.calibrating);
 }
 
 /// Each exponent on either side of the rating at which it changes.

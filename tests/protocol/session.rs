@@ -327,6 +327,8 @@ fn what_is_told_is_what_arrives() {
         frequency_hz: Some(-82.3),
         torque_estimate_nm: Some(-78.9),
         temperature_c: None,
+        angle_zero_deg: Some(179.99),
+        calibrating: true,
     };
     bench.sent.clear();
     bench.silence(300);
@@ -354,6 +356,7 @@ fn what_is_told_is_what_arrives() {
     assert!(near(measured.current_a, 412.3, 0.1) && near(measured.id_ref_a, -200.1, 0.1));
     assert!(near(measured.voltage_v, 700.0, 0.1) && near(measured.frequency_hz, -82.3, 0.05));
     assert!(near(measured.torque_estimate_nm, -78.9, 0.1));
+    assert!(near(measured.angle_zero_deg, 179.99, 0.01) && measured.calibrating);
     assert_eq!((measured.link_v, measured.iq_ref_a, measured.temperature_c), (None, None, None));
     assert!(bench.sent.iter().any(|frame| frame.id == MOTION.id));
 }

@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 mod angle_harmonics;
+mod angle_zero;
 mod controller;
 pub mod current_loop;
 mod demagnetisation;
@@ -35,6 +36,7 @@ use crate::machine::Tables;
 use crate::time::Clock;
 
 pub use angle_harmonics::AngleHarmonics;
+pub use angle_zero::{AngleZero, WithoutTorque};
 pub use controller::{AimInput, Controller, Target};
 pub use current_loop::{Gains, Regulated};
 pub use demand::{Demand, LinkWindow};

@@ -185,6 +185,8 @@ impl Listener {
                 measured.frequency_hz,
                 measured.temperature_c,
                 measured.torque_estimate_nm,
+                measured.angle_zero_deg,
+                Some(measured.calibrating.into()),
             ],
             System::Zs9 => {
                 let [first, second] = &self.zs9.motors;

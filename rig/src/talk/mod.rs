@@ -86,6 +86,7 @@ pub(crate) fn with_traction(
     supervisor: &mut dyn Supervisor,
 ) -> Result<Recording> {
     Traction::check(options, &Map::new(), machine)?;
+    let options = &Traction::filled(options, machine);
     let idle = Request::idle(&machine.tables.ratings);
     // The requests come from the frames, not from here.
     let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
@@ -106,6 +107,7 @@ pub(crate) fn with_zs9(
 ) -> Result<zs9::trace::Recording> {
     let own = Options { run: run_options(options), own: options.zs9.clone() };
     Zs9::check(&own, &Map::new(), machine)?;
+    let own = Zs9::filled(&own, machine);
     // The demands that the operator permits replace these.
     let operator = |_: f64, _: zs9::SeenMotors| zs9::Orders {
         demands: [MotorDemand::Speed(0.0); 2],

@@ -24,6 +24,8 @@ pub enum Action {
     Discharge,
     /// Acknowledges the fault.
     Acknowledge,
+    /// Calibrates the zero of the position sensor, or no longer.
+    Calibrate(bool),
     /// Torques, in N·m, along linear ramps of this many seconds; for one motor only the first.
     Torque([f64; 2], f64),
     /// Speeds in r/min, along linear ramps of this many r/min per second: for one motor only the first, held by a speed loop here; for
@@ -201,7 +203,7 @@ pub const ZS9_COMMANDS: [Command; 5] = [
 ];
 
 /// Every command.
-pub const COMMANDS: [Command; 24] = [
+pub const COMMANDS: [Command; 25] = [
     ("enable [with-torque]", |words| words.enable()),
     ("disable", |_| Ok(Action::Disable)),
     ("off on|off", |words| Ok(Action::Off(words.switch()?))),
@@ -209,6 +211,7 @@ pub const COMMANDS: [Command; 24] = [
     ("charge", |_| Ok(Action::Charge)),
     ("discharge", |_| Ok(Action::Discharge)),
     ("acknowledge", |_| Ok(Action::Acknowledge)),
+    ("calibrate on|off", |words| Ok(Action::Calibrate(words.switch()?))),
     ("torque NM [over SECONDS]", |words| words.torque(1)),
     ("speed RPM [at RPM_PER_SECOND]", |words| words.speed(1)),
     ("load NM", |words| words.load(1)),
@@ -242,6 +245,9 @@ fn action(name: &str, words: &mut Words, system: System) -> Result<Action> {
     match known {
         Some(_) if system == System::Zs9 && name == "link-limits" => {
             bail!("link-limits: the ZS9 has none; `link` is its voltage")
+        }
+        Some(_) if system == System::Zs9 && name == "calibrate" => {
+            bail!("calibrate: the ZS9 has no such command; its zeros are keys of the power stage")
         }
         Some((_, read)) => read(words),
         None => bail!("{name}: must be one of: {}", COMMANDS.map(|(usage, _)| usage).join(", ")),

@@ -26,10 +26,21 @@ impl Spoken {
         let levels = self.levels;
         match system {
             System::Pmasynrm => {
-                let Levels { enable, with_torque, off, coast, charge, discharge, acknowledge } = levels;
+                let Levels { enable, with_torque, off, coast, charge, discharge, acknowledge, calibrate } =
+                    levels;
                 let [torque_nm, _] = self.torques_nm;
-                Command { enable, with_torque, off, coast, charge, discharge, acknowledge, torque_nm }
-                    .encode(scales)
+                Command {
+                    enable,
+                    with_torque,
+                    off,
+                    coast,
+                    charge,
+                    discharge,
+                    acknowledge,
+                    calibrate,
+                    torque_nm,
+                }
+                .encode(scales)
             }
             System::Zs9 => {
                 let demands =

@@ -167,6 +167,7 @@ impl Talk {
             Action::Charge => self.raise(0),
             Action::Discharge => self.raise(1),
             Action::Acknowledge => self.raise(2),
+            Action::Calibrate(level) => levels.calibrate = *level,
             Action::Torque(to, over_s) => {
                 let from = self.command.torques_nm.map(f64::from);
                 self.ramp = Ramp { from, to: *to, begin_s: t_s, over_s: *over_s };

@@ -43,7 +43,7 @@ impl System {
 const STATUS: &str =
     "listening fault fault_value fault_limit refusal refusals precharge main discharge chopper_percent";
 const MEASURED: &str = "speed_rpm torque_nm link_v current_a id_ref_a iq_ref_a voltage_v frequency_hz temperature_c \
-    torque_estimate_nm";
+    torque_estimate_nm angle_zero_deg calibrating";
 const ZS9_MEASURED: &str = "speed1_rpm torque1_nm current1_a speed2_rpm torque2_nm current2_a \
     link_v capacitor_v duty_percent";
 const COUNTS: &str = "received taken lost unknown truncated corrupted repeated disordered out_of_range \

@@ -13,7 +13,8 @@ use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
 use crate::control::{
-    AngleHarmonics, ControlLaw, Controller, LinkDamper, LinkRipple, Measurements, ModeLimits, Target,
+    AngleHarmonics, AngleZero, ControlLaw, Controller, LinkDamper, LinkRipple, Measurements, ModeLimits,
+    Target,
 };
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
@@ -87,6 +88,9 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     /// The known errors of the position sensor, and the deviation of the angle from the one extrapolated from the last by the speed, in rad.
     harmonics: AngleHarmonics,
     innovation_rad: f32,
+    /// The correction of the position sensor's zero, and whether it is being found.
+    zero: AngleZero,
+    calibrating: bool,
     zeros: CurrentZeros,
     gains: CurrentGains,
     delay: CurrentDelay,
@@ -140,6 +144,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
                 settings.angle_late_s - settings.clock.seconds(settings.current_filter_ticks as i32),
             ),
             innovation_rad: 0.0,
+            zero: AngleZero::NONE,
+            calibrating: false,
             zeros: CurrentZeros::new(),
             gains: CurrentGains::new(),
             delay: CurrentDelay::NONE,
@@ -234,7 +240,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.check(Some((fault, 1.0, 0.0)), sample, port);
         }
         self.check_legs(sample, port);
-        let angle = sample.angle.map(|angle| self.harmonics.corrected(angle));
+        let angle = sample.angle.map(|angle| self.harmonics.corrected(angle + self.zero.angle()));
         let (omega, lost) = self.track(angle, command.enable, port);
         let coarse = self.settings.counts_coarsely();
         let here = if coarse { self.controller.tracker().angle() } else { angle.unwrap_or(Angle::ZERO) };
@@ -356,6 +362,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             speed_known: self.controller.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
             mode: self.mode,
+            angle_zero: self.zero.angle(),
+            calibrating: self.calibrating,
         }
     }
 

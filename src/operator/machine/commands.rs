@@ -2,7 +2,7 @@
 
 use super::{Edges, Operator, Phase};
 use crate::operator::line::{Discharge, Precharge};
-use crate::operator::{Demands, Input, Levels, Refusal, Settings, Situation, demand, health};
+use crate::operator::{Demands, Input, Levels, Refusal, Settings, Situation, State, demand, health};
 use crate::protection::SafeState;
 
 impl<D: Demands> Operator<D> {
@@ -14,8 +14,9 @@ impl<D: Demands> Operator<D> {
         settings: &Settings,
     ) {
         let levels = D::levels(request);
-        let Levels { enable, charge, discharge, acknowledge, .. } = levels;
-        let last = core::mem::replace(&mut self.last, Edges { enable, charge, discharge, acknowledge });
+        let Levels { enable, charge, discharge, acknowledge, calibrate, .. } = levels;
+        let now = Edges { enable, charge, discharge, acknowledge, calibrate };
+        let last = core::mem::replace(&mut self.last, now);
         self.obey_levels(&levels, D::link_may_rest(&observed.report), input, settings);
         if acknowledge && !last.acknowledge {
             self.acknowledge(input, settings);
@@ -28,6 +29,9 @@ impl<D: Demands> Operator<D> {
         }
         if enable && !last.enable {
             self.enable(request, &levels, input, settings);
+        }
+        if calibrate && !last.calibrate {
+            self.calibrate();
         }
     }
 
@@ -127,6 +131,15 @@ impl<D: Demands> Operator<D> {
             (D::asks_torque(request) && !levels.with_torque, Refusal::TorqueNotZero),
         ];
         refusals.into_iter().find_map(|(refused, reason)| refused.then_some(reason))
+    }
+
+    /// The zero is calibrated while the level is set and the drive is enabled without torque; here it is only said if it is not at the beginning.
+    fn calibrate(&mut self) {
+        match self.state() {
+            State::Enabled => self.refusal = None,
+            State::Running => self.refuse(Refusal::TorqueNotZero),
+            _ => self.refuse(Refusal::NotEnabled),
+        }
     }
 
     fn charge(&mut self, settings: &Settings) {

@@ -28,6 +28,9 @@ const VOLTAGE: Signal = Signal::physical("voltage_v", "V", 16, 0.1, LINK_V).of(Q
 const FREQUENCY: Signal = Signal::physical("frequency_hz", "Hz", 32, 0.05, FREQUENCY_HZ).of(Quantity::Speed);
 const TEMPERATURE: Signal = Signal::physical("temperature_c", "degC", 48, 0.1, [-100.0, 300.0]);
 
+const ZERO: Signal = Signal::physical("angle_zero_deg", "deg", 16, 0.01, [-180.0, 180.0]);
+const CALIBRATING: Signal = Signal::flag("calibrating", 32);
+
 /// Speed, torque, link.
 pub const MOTION: Message = Message::new("MOTION", 0x182, 6, 10, &[SPEED, TORQUE, LINK])
     .telling(12, &[Quantity::Speed, Quantity::Torque, Quantity::Voltage]);
@@ -40,6 +43,9 @@ pub const VOLTAGES: Message = Message::new("VOLTAGES", 0x184, 8, 10, &[VOLTAGE, 
 /// The torque that flows.
 pub const TORQUE_ESTIMATE: Message =
     Message::new("TORQUE_ESTIMATE", 0x189, 13, 10, &[ESTIMATE]).telling(12, &[Quantity::Torque]);
+
+/// Correction of the position sensor's zero.
+pub const ANGLE_ZERO: Message = Message::new("ANGLE_ZERO", 0x18D, 30, 100, &[ZERO, CALIBRATING]);
 
 /// The measurements, and the values that control derives from them. `None`: not available.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,6 +71,10 @@ pub struct Measured {
     pub frequency_hz: Option<f32>,
     /// The winding's hottest place, in °C.
     pub temperature_c: Option<f32>,
+    /// Correction of the position sensor's zero, electrical, in degrees: the drive adds it to the sensor's angle.
+    pub angle_zero_deg: Option<f32>,
+    /// `true` while that is being found.
+    pub calibrating: bool,
 }
 
 /// Measurements of one message.
@@ -99,7 +109,15 @@ impl Measured {
         encode(&[(&ESTIMATE, self.torque_estimate_nm)], scales)
     }
 
-    /// Adopts the content of one of these four messages, without its mark.
+    /// Content of [`ANGLE_ZERO`].
+    pub fn angle_zero(&self) -> Payload {
+        let mut payload = Payload::default();
+        ZERO.put_measured(&mut payload, self.angle_zero_deg);
+        CALIBRATING.put_raw(&mut payload, self.calibrating.into());
+        payload
+    }
+
+    /// Adopts the content of one of these five messages, without its mark.
     pub fn merge(&mut self, message: &Message, payload: Payload, scales: Scales) {
         match message.id {
             id if id == MOTION.id => {
@@ -116,6 +134,10 @@ impl Measured {
                 self.voltage_v = VOLTAGE.get_on(scales, payload);
                 self.frequency_hz = FREQUENCY.get_on(scales, payload);
                 self.temperature_c = TEMPERATURE.get_on(scales, payload);
+            }
+            id if id == ANGLE_ZERO.id => {
+                self.angle_zero_deg = ZERO.get(payload);
+                self.calibrating = CALIBRATING.is_set(payload);
             }
             id if id == TORQUE_ESTIMATE.id => self.torque_estimate_nm = ESTIMATE.get_on(scales, payload),
             _ => (),

@@ -9,7 +9,7 @@ mod trip;
 
 pub use answer::{Outcome, PARAMETER_ANSWER, ParameterAnswer};
 pub use counters::{COUNTERS, Counts};
-pub use measured::{CURRENTS, MOTION, Measured, TORQUE_ESTIMATE, VOLTAGES};
+pub use measured::{ANGLE_ZERO, CURRENTS, MOTION, Measured, TORQUE_ESTIMATE, VOLTAGES};
 pub use status::{Listening, Pattern, STATUS, StatusFrame};
 pub use temperatures::{TEMPERATURES, TemperaturesFrame};
 pub use trip::{FAULT_LIMIT, FAULT_VALUE, trip_frames, trip_number};

@@ -7,12 +7,13 @@ use super::super::slot::{Decision, Slot};
 use super::super::{Settings, Shared};
 use super::{ControlTask, Input};
 use crate::control::{
-    AimInput, AngleHarmonics, ControlLaw, DeadTime, Demand, Law, LinkDamper, Measurements, RotorSample,
+    AimInput, AngleHarmonics, ControlLaw, DeadTime, Demand, Law, LinkDamper, Measurements, Regulated,
+    RotorSample, WithoutTorque,
 };
 use crate::frames::{Angle, SinCos, six_step_v};
 use crate::machine::Machine;
 use crate::modulation::{Mode, Reference, SwitchLimits};
-use crate::ports::Sample;
+use crate::ports::{DriveCommand, Sample};
 use crate::protection::{DiodeWatch, FrozenWatch, SafeState, UnexplainedWatch, safe_state};
 use crate::time::Instant;
 
@@ -61,7 +62,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             && self.boundary != Some(at)
             && (aims || !commands || slot.folds)
         {
-            self.learn(input.sample, measured.angle, slot, shared);
+            self.learn(input, measured.angle, slot, shared);
             self.boundary = Some(at);
         }
         if aims {
@@ -112,7 +113,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// Learns from the newest boundary.
-    pub(super) fn learn(&mut self, sample: &Sample, angle: Angle, slot: &Slot, shared: &Shared) {
+    pub(super) fn learn(&mut self, input: Input, angle: Angle, slot: &Slot, shared: &Shared) {
+        let Input { sample, command } = input;
         let Settings { gains, clock, .. } = &self.settings;
         let tables = self.machine.tables();
         let boundary =
@@ -124,7 +126,25 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.controller.learn(&boundary, &there, follows(slot.key.mode), &Law { gains, clock, tables });
             let (unexplained_v, omega) = (self.controller.unexplained_v(), self.controller.omega());
             self.unexplained.step(unexplained_v, 0.0, omega, boundary.length_s, tables);
+            self.calibrate(command, slot, boundary.length_s);
         }
+    }
+
+    /// Calibrates the zero of the position sensor, if that is asked for and possible: without torque, in a mode that makes what is commanded.
+    fn calibrate(&mut self, command: &DriveCommand, slot: &Slot, length_s: f32) {
+        self.calibrating = command.calibrate
+            && command.demand.torque_nm == 0.0
+            && follows(slot.key.mode) == Regulated::Mean
+            && {
+                let ratings = &self.machine.tables().ratings;
+                self.zero.learn(&WithoutTorque {
+                    unexplained_v: self.controller.unexplained_v(),
+                    omega: self.controller.omega(),
+                    max_omega: ratings.max_speed_rad_s * ratings.pole_pairs,
+                    magnets_wb: ratings.magnet_flux_wb,
+                    length_s,
+                })
+            };
     }
 
     /// The operating point of the command that a boundary will use.
@@ -252,6 +272,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             ..Reference::NONE
         };
         self.harmonics.pause();
+        self.calibrating = false;
     }
 }
 

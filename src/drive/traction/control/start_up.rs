@@ -69,7 +69,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
                 StartUpStep::Wait => return false,
                 StartUpStep::Pulse(wanted) => vector = wanted,
                 StartUpStep::Found(zero) => {
-                    port.align(now, zero);
+                    // The drive adds its own to what the sensor then says.
+                    port.align(now, zero - self.zero.angle());
                     return false;
                 }
                 StartUpStep::Failed => {
