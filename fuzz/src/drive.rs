@@ -140,7 +140,6 @@ impl ControlPort for Board {
             6 => command.demand.slew_limited = true,
             7 => command.enable = false,
             8 => command.acknowledge = bits as u8,
-            10 => (command.calibrate, command.demand.torque_nm) = (true, 0.0),
             _ => {}
         }
         command

@@ -54,7 +54,7 @@ fn the_drive_goes_from_standstill_to_2000_rpm_and_back() {
     }
 }
 
-/// A zero that is 8° off is found, and refused when the machine cannot show it; the script says when.
+/// A zero that is 8° off is found, and refused when the machine cannot show it; the script says when. The torque is then what is asked for.
 #[test]
 fn the_zero_of_the_angle_is_calibrated_either_way() {
     for error in ["8", "-8"] {
@@ -68,6 +68,16 @@ fn the_zero_of_the_angle_is_calibrated_either_way() {
         talk.arg(&script_of).args(["--angle-error", error, "--out"]).arg(&out);
         let output = talk.output().unwrap();
         assert!(output.status.success(), "{error}: {}", String::from_utf8_lossy(&output.stderr));
+        let rows = rows(&out.join("trace.csv"));
+        let torques = [(5.0, 0.0), (6.8, 300.0)].map(|(from_s, asked_nm)| {
+            let within = |row: &&std::collections::BTreeMap<String, String>| {
+                (from_s..from_s + 0.3).contains(&row["t_s"].parse().unwrap())
+            };
+            let torques: Vec<f64> =
+                rows.iter().filter(within).map(|row| row["te_nm"].parse().unwrap()).collect();
+            torques.iter().sum::<f64>() / torques.len() as f64 - asked_nm
+        });
+        assert!(torques.iter().all(|off_nm| off_nm.abs() < 6.0), "{error}: {torques:?}");
     }
 }
 

@@ -5,7 +5,10 @@
 //! natural frequency is ω₀, follows a part of an error that turns with ω: the remainder E is that of an error D = E (1 − (ω₀/ω)² − 2j ω₀/ω). Over some whole
 //! turns of even speed E is the mean of the remainder times 2 e^(−jkθ), and half of D is added to what is known: the error goes away in some of these times
 //! whatever noise, lag and acceleration are, and nothing is fed back faster than it was measured.
+//!
+//! A constant error, the sensor's [zero](AngleZero), leaves nothing to the tracker; it is found on demand.
 
+use super::angle_zero::{AngleZero, WithoutTorque};
 use super::speed::SpeedTracker;
 use crate::frames::{Angle, SinCos, limit_magnitude};
 
@@ -80,6 +83,10 @@ pub struct AngleHarmonics {
     omega: f32,
     /// `true` if the known errors are worth removing.
     used: bool,
+    /// `true` once these or the zero have been.
+    corrects: bool,
+    /// The constant error, removed first.
+    zero: AngleZero,
 }
 
 impl AngleHarmonics {
@@ -95,17 +102,34 @@ impl AngleHarmonics {
             last: Angle::ZERO,
             omega: 0.0,
             used: false,
+            corrects: false,
+            zero: AngleZero::NONE,
         }
+    }
+
+    /// The angle that is added to the sensor's as its zero.
+    pub fn zero(&self) -> Angle {
+        self.zero.angle()
+    }
+
+    /// Learns the zero: [`AngleZero::learn`].
+    pub fn learn_zero(&mut self, rest: &WithoutTorque) -> bool {
+        self.corrects = true;
+        self.zero.learn(rest)
     }
 
     /// A measured angle without the known errors.
     #[inline(always)]
     pub fn corrected(&self, measured: Angle) -> Angle {
-        if self.used { self.without(measured) } else { measured }
+        if self.corrects { self.without(measured) } else { measured }
     }
 
     #[inline(never)]
     fn without(&self, measured: Angle) -> Angle {
+        let measured = measured + self.zero.angle();
+        if !self.used {
+            return measured;
+        }
         let there = measured.sin_cos();
         let error_rad = self.error_rad(there);
         // The errors depend on the true angle, which the first look approximates.
@@ -182,6 +206,7 @@ impl AngleHarmonics {
             second.learn(twice, 0.5 * ratio);
             let squares = self.known.map(|part| part.cos * part.cos + part.sin * part.sin);
             self.used = squares[0] + squares[1] > LEFT_ALONE_RAD * LEFT_ALONE_RAD;
+            self.corrects |= self.used;
         }
     }
 }
@@ -191,6 +216,7 @@ mod tests {
     extern crate std;
 
     use super::*;
+    use crate::frames::Dq;
     use std::vec::Vec;
 
     const PERIOD_S: f32 = 1e-4;
@@ -317,13 +343,45 @@ mod tests {
         assert!(!AngleHarmonics::can_observe(&SpeedTracker::with_natural(0.0)), "at rest");
     }
 
+    /// The zero is added with harmonics and without, and stays when they are forgotten.
+    #[test]
+    fn a_zero_is_added_to_every_angle() {
+        let unexplained_v = Dq { d: 100.0, q: 0.0 };
+        let rest =
+            WithoutTorque { unexplained_v, omega: 500.0, max_omega: 1e3, magnets_wb: 1.0, length_s: 0.1 };
+        let tracker = tracker(0.5e-3, 500.0);
+        for with_harmonics in [false, true] {
+            let mut harmonics = AngleHarmonics::new(0.0);
+            assert!(harmonics.learn_zero(&rest));
+            let zero_rad = harmonics.zero().signed_radians();
+            assert!((zero_rad - 0.08).abs() < 1e-6, "{zero_rad}");
+            if with_harmonics {
+                four_turns(&mut harmonics, &tracker, false);
+                four_turns(&mut harmonics, &tracker, false);
+            }
+            assert_eq!(harmonics.used, with_harmonics);
+            let sensed = Angle::DEG_90 - harmonics.zero();
+            let without = AngleHarmonics { zero: AngleZero::NONE, ..harmonics };
+            assert_eq!(harmonics.corrected(sensed), without.corrected(Angle::DEG_90));
+            harmonics.known = [Part::NONE; 2];
+            (harmonics.omega, harmonics.samples, harmonics.sums) = (tracker.omega(), 1, [Part::NONE; 2]);
+            harmonics.end(&tracker);
+            assert!(!harmonics.used);
+            assert_eq!(harmonics.corrected(Angle::ZERO), harmonics.zero());
+        }
+    }
+
     #[test]
     fn an_error_as_large_as_what_is_left_alone_is_left_alone() {
         for (cos, used) in [(LEFT_ALONE_RAD, false), (1.001 * LEFT_ALONE_RAD, true)] {
             let tracker = tracker(0.5e-3, 500.0);
             let part = Part { cos, sin: 0.0 };
-            let mut harmonics =
-                AngleHarmonics { known: [part, Part::NONE], used: true, ..AngleHarmonics::new(0.0) };
+            let mut harmonics = AngleHarmonics {
+                known: [part, Part::NONE],
+                used: true,
+                corrects: true,
+                ..AngleHarmonics::new(0.0)
+            };
             (harmonics.omega, harmonics.samples) = (tracker.omega(), 1);
             harmonics.end(&tracker);
             assert_eq!(harmonics.used, used, "{cos} rad");

@@ -13,8 +13,7 @@ use super::six_step_exit::SixStepExit;
 use super::slot::{Decision, Slot};
 use super::{Settings, Shared};
 use crate::control::{
-    AngleHarmonics, AngleZero, ControlLaw, Controller, LinkDamper, LinkRipple, Measurements, ModeLimits,
-    Target,
+    AngleHarmonics, ControlLaw, Controller, LinkDamper, LinkRipple, Measurements, ModeLimits, Target,
 };
 use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{PeriodInput, SlotTimer};
@@ -30,13 +29,11 @@ use start_up::Starting;
 
 type Input<'a> = PeriodInput<'a, Traction>;
 
-/// A period after its checks: its nominal instant, the measurements with the angle at their instant, the electrical speed in rad/s, and the mode of
-/// the newest half that was loaded.
+/// A period after its checks: its nominal instant, the measurements with the angle at their instant, and the electrical speed in rad/s.
 struct Seen {
     now: Instant,
     measured: Measurements,
     omega: f32,
-    loaded: Mode,
 }
 
 /// The control interrupt's task, for a machine and a control law. The order in memory is deliberate, with the remembered halves last: a number within
@@ -73,8 +70,9 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     /// The newest command, and whether it is for the half that is already committed.
     reference: Reference,
     revises: bool,
-    /// Mode that the command was made for.
+    /// Mode that the command was made for, and that of the newest half that was loaded.
     mode: Mode,
+    loaded: Mode,
     masked: MaskedFaults,
     trip: Option<Trip>,
     acknowledge: Acknowledge,
@@ -88,8 +86,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller> {
     /// The known errors of the position sensor, and the deviation of the angle from the one extrapolated from the last by the speed, in rad.
     harmonics: AngleHarmonics,
     innovation_rad: f32,
-    /// The correction of the position sensor's zero, and whether it is being found.
-    zero: AngleZero,
+    /// `true` while the zero of the position sensor is being found.
     calibrating: bool,
     zeros: CurrentZeros,
     gains: CurrentGains,
@@ -133,6 +130,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             reference: Reference::NONE,
             revises: false,
             mode: Mode::Off,
+            loaded: Mode::Off,
             masked: MaskedFaults::NONE,
             trip: None,
             acknowledge: Acknowledge::new(),
@@ -144,7 +142,6 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
                 settings.angle_late_s - settings.clock.seconds(settings.current_filter_ticks as i32),
             ),
             innovation_rad: 0.0,
-            zero: AngleZero::NONE,
             calibrating: false,
             zeros: CurrentZeros::new(),
             gains: CurrentGains::new(),
@@ -240,7 +237,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.check(Some((fault, 1.0, 0.0)), sample, port);
         }
         self.check_legs(sample, port);
-        let angle = sample.angle.map(|angle| self.harmonics.corrected(angle + self.zero.angle()));
+        let angle = sample.angle.map(|angle| self.harmonics.corrected(angle));
         let (omega, lost) = self.track(angle, command.enable, port);
         let coarse = self.settings.counts_coarsely();
         let here = if coarse { self.controller.tracker().angle() } else { angle.unwrap_or(Angle::ZERO) };
@@ -253,14 +250,15 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let failed = self.judge(command, &measured, omega);
         self.check(failed, sample, port);
         measured.currents_a = self.gains.without(measured.currents_a);
-        Seen { now, measured, omega, loaded: told.map_or(Mode::Off, |told| told.mode) }
+        self.loaded = told.map_or(Mode::Off, |told| told.mode);
+        Seen { now, measured, omega }
     }
 
     /// The control law, or its restart; `true` if there are to be pulses.
     #[inline(always)]
     fn decide(&mut self, seen: &Seen, input: Input, port: &mut impl ControlPort, shared: &Shared) -> bool {
         let Input { sample, command } = input;
-        let Seen { now, ref measured, omega, .. } = *seen;
+        let Seen { now, ref measured, omega } = *seen;
         let pulsing =
             self.trip.is_none() && command.enable && self.controller.speed_is_known() && !self.exit.crosses();
         let slot = Slot::of(&self.pulses, now, &self.settings.clock);
@@ -337,10 +335,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     ) {
         let now = seen.now;
         if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, input, seen.loaded, pulsing), self.trip.is_some());
+            recorder.record(self.entry(now, input, pulsing), self.trip.is_some());
         }
         if self.operated && self.slots.begins() {
             shared.operator.tell(now, &self.report(input.sample));
+            if input.command.calibrate | self.calibrating {
+                self.calibrate(input.command, pulsing);
+            }
         }
         port.report(now, || self.report(input.sample));
     }
@@ -362,14 +363,14 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             speed_known: self.controller.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
             mode: self.mode,
-            angle_zero: self.zero.angle(),
+            angle_zero: self.harmonics.zero(),
             calibrating: self.calibrating,
         }
     }
 
     /// The period's entry in the flight recorder.
     #[inline(always)]
-    fn entry(&self, at: Instant, input: Input, mode: Mode, pulsing: bool) -> Record {
+    fn entry(&self, at: Instant, input: Input, pulsing: bool) -> Record {
         let Input { sample, command } = input;
         let Target { current, .. } = self.controller.target();
         Record {
@@ -380,7 +381,12 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             id_a: current.d,
             iq_a: current.q,
             voltage_v: self.reference.voltage_v,
-            state: State { mode, enabled: command.enable, pulsing, fault: self.trip.map(|trip| trip.fault) },
+            state: State {
+                mode: self.loaded,
+                enabled: command.enable,
+                pulsing,
+                fault: self.trip.map(|trip| trip.fault),
+            },
         }
     }
 

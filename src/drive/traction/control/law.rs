@@ -20,6 +20,9 @@ use crate::time::Instant;
 /// Share of the largest torque beyond which a jump of the demand is worth revising the next half.
 const JUMP_SHARE: f32 = 0.05;
 
+/// Time between two reports to the operator, in s.
+const SLOT_S: f32 = 1e-3;
+
 /// Control periods that the running half must still last for the next one to be revised: one until the command is valid, and one in which control
 /// sees the result.
 const REVISION_PERIODS: u32 = 2;
@@ -62,7 +65,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             && self.boundary != Some(at)
             && (aims || !commands || slot.folds)
         {
-            self.learn(input, measured.angle, slot, shared);
+            self.learn(input.sample, measured.angle, slot, shared);
             self.boundary = Some(at);
         }
         if aims {
@@ -113,8 +116,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     }
 
     /// Learns from the newest boundary.
-    pub(super) fn learn(&mut self, input: Input, angle: Angle, slot: &Slot, shared: &Shared) {
-        let Input { sample, command } = input;
+    pub(super) fn learn(&mut self, sample: &Sample, angle: Angle, slot: &Slot, shared: &Shared) {
         let Settings { gains, clock, .. } = &self.settings;
         let tables = self.machine.tables();
         let boundary =
@@ -126,25 +128,24 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             self.controller.learn(&boundary, &there, follows(slot.key.mode), &Law { gains, clock, tables });
             let (unexplained_v, omega) = (self.controller.unexplained_v(), self.controller.omega());
             self.unexplained.step(unexplained_v, 0.0, omega, boundary.length_s, tables);
-            self.calibrate(command, slot, boundary.length_s);
         }
     }
 
-    /// Calibrates the zero of the position sensor, if that is asked for and possible: without torque, in a mode that makes what is commanded.
-    fn calibrate(&mut self, command: &DriveCommand, slot: &Slot, length_s: f32) {
-        self.calibrating = command.calibrate
-            && command.demand.torque_nm == 0.0
-            && follows(slot.key.mode) == Regulated::Mean
-            && {
-                let ratings = &self.machine.tables().ratings;
-                self.zero.learn(&WithoutTorque {
-                    unexplained_v: self.controller.unexplained_v(),
-                    omega: self.controller.omega(),
-                    max_omega: ratings.max_speed_rad_s * ratings.pole_pairs,
-                    magnets_wb: ratings.magnet_flux_wb,
-                    length_s,
-                })
-            };
+    /// Calibrates the zero of the position sensor for a slot, if that is possible: without torque, in a mode with a carrier.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn calibrate(&mut self, command: &DriveCommand, pulsing: bool) {
+        let ratings = &self.machine.tables().ratings;
+        let rests = command.calibrate && pulsing && command.demand.torque_nm == 0.0;
+        self.calibrating = rests
+            && follows(self.mode) == Regulated::Mean
+            && self.harmonics.learn_zero(&WithoutTorque {
+                unexplained_v: self.controller.unexplained_v(),
+                omega: self.controller.omega(),
+                max_omega: ratings.max_speed_rad_s * ratings.pole_pairs,
+                magnets_wb: ratings.magnet_flux_wb,
+                length_s: SLOT_S,
+            });
     }
 
     /// The operating point of the command that a boundary will use.
@@ -272,7 +273,6 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             ..Reference::NONE
         };
         self.harmonics.pause();
-        self.calibrating = false;
     }
 }
 

@@ -70,7 +70,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
                 StartUpStep::Pulse(wanted) => vector = wanted,
                 StartUpStep::Found(zero) => {
                     // The drive adds its own to what the sensor then says.
-                    port.align(now, zero - self.zero.angle());
+                    port.align(now, zero - self.harmonics.zero());
                     return false;
                 }
                 StartUpStep::Failed => {
