@@ -1,4 +1,4 @@
-//! An angle that is read late, whose age the drive is told, and one that is read in steps.
+//! An angle that is read late, whose age the drive is told, one that is read in steps, and one with a resolver's error in a sweep.
 
 use tractive_rig::scenario::catalogue;
 use tractive_rig::trace::Recorded;
@@ -47,5 +47,19 @@ fn between_coarse_counts_the_angle_follows_the_speed() {
         let worst = worst(&catches(&format!("--encoder-lines {lines}")));
         println!("{lines} lines: {:.2} % of the demand at worst", 100.0 * worst);
         assert!(worst < 0.01, "{lines} lines: {worst}");
+    }
+}
+
+/// 3° of once the angle are learnt on the way, before a border between two modes comes.
+#[test]
+fn a_resolvers_error_makes_no_mode_hunt() {
+    for line in
+        ["sweep --angle-1f-deg 3", "sweep --angle-1f-deg 3 --slope 500", "sweep --angle-1f-deg 3 --down"]
+    {
+        let chosen = catalogue::of_traction(line).unwrap();
+        let machine = chosen.machine().unwrap();
+        let recording = chosen.drive(&machine).unwrap();
+        let figures = chosen.figures(&recording, &machine);
+        assert!(!figures.fall_short() && recording.trip().is_none(), "{line}: {:?}", figures.get("verdicts"));
     }
 }
