@@ -53,7 +53,7 @@ impl Scenario<Traction> for Steady {
         let mut verdicts = bound::verdicts(&beside, options).to_vec();
         if options.own.line.is_some() {
             let swing = analysis::link_swing(analysis::window(recording, window.0, window.1));
-            verdicts.push(Verdict::at_most("swing of the link (share of its voltage)", swing, 0.03));
+            verdicts.push(analysis::swing_verdict("swing of the link", [swing].into_iter()));
         }
         if options.dead_time_us > 0.0 {
             let (speed_rpm, point_nm) = DEAD_TIME_POINT;
