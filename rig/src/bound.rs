@@ -2,7 +2,8 @@
 //! at all.
 //!
 //! The volt-seconds of the pattern are exactly the stationary flux; without mean and fundamental they are its ripple. Added to the mean flux linkage
-//! of the operating point and converted into current by the map, they give the least that any control could reach with these pulses.
+//! of the operating point and converted into current by the map, they give the least that any control could reach with these pulses. The folder is the
+//! true machine's, whatever its map and its resistance are in the drive's tables.
 
 use crate::analysis;
 use crate::distortion::{self, Distortion, Samples};

@@ -183,36 +183,41 @@ fn a_sweep_behind_a_line_filter_keeps_its_bounds() {
     }
 }
 
-/// A drive whose demand is beyond what the link gives damps it as well: the torque then follows the voltage limit, and the limit follows the link's
-/// swing. When the limit followed only the link's slow value, these swung by 6.5 and 3.1 %.
-/// Steps of the line by 200 V at full torque, one 150 ms after the other: nothing trips, and 110 ms later the link swings by less than 1 % of its voltage
-/// behind the usual filter, and by less than 7 % elsewhere. Before wide swings had a law of their own, all of these filters but 1 mH and 4 mF tripped.
+/// Steps of the line by 200 V at full torque, one 150 ms after the other: nothing trips, and 110 ms later the link swings by at most the first share of
+/// its voltage at 3,000 r/min, and by at most the second at any of the five speeds. Before wide swings had a law of their own, all of these filters but
+/// 1 mH and 4 mF tripped. Where these fall short of the verdict's 3 %, little power damps the link at 300 r/min; behind 1 mH and 2 mF square wave, which begins
+/// at 1,800 r/min when the step has died out already, makes the link swing again.
 #[test]
 fn steps_of_the_line_die_out() {
     let lines = [
-        ("3,4,30", 0.01),
-        ("3,4,30 --drives 2", 0.01),
-        ("3,4,30 --real", 0.01),
-        ("3,4,30 --udc 1650", 0.01),
-        ("1,4,30", 0.01),
-        ("1,2,10", 0.01),
-        ("8,2,10", 0.01),
-        ("8,8,10", 0.07),
+        ("3,4,30", 0.01, 0.035),
+        ("3,4,30 --drives 2", 0.01, 0.02),
+        ("3,4,30 --real", 0.01, 0.035),
+        ("3,4,30 --udc 1650", 0.01, 0.035),
+        ("1,4,30", 0.01, 0.01),
+        ("1,2,10", 0.01, 0.15),
+        ("8,2,10", 0.01, 0.04),
+        ("8,8,10", 0.07, 0.13),
     ];
-    lines.par_iter().for_each(|(line, most)| {
+    lines.par_iter().for_each(|(line, fast, any)| {
         let chosen = catalogue::of_traction(&format!("link-steps --line {line}")).unwrap();
-        let recording = chosen.drive(&chosen.machine().unwrap()).unwrap();
+        let machine = chosen.machine().unwrap();
+        let recording = chosen.drive(&machine).unwrap();
         assert!(recording.trip().is_none(), "{line}: {:?}", recording.trip());
-        let end_s = recording.rows.last().unwrap().t_s;
-        for hold in 0..4 {
-            let from_s = end_s - 0.6 + 0.15 * f64::from(hold) + 0.11;
-            let swing = analysis::link_swing(analysis::window(&recording, from_s, from_s + 0.04));
-            println!("{line}: {swing:?}");
-            assert!(swing < *most, "{line}, step {hold}: {swing}");
+        let figures = chosen.figures(&recording, &machine);
+        println!("{line}: {}", figures.get("verdicts").unwrap()[2]);
+        assert_eq!(figures.fall_short(), *any > 0.03, "{line}");
+        let swings = figures.get("link_swings").and_then(|swings| swings.as_array()).unwrap();
+        assert_eq!(swings.len(), 20, "{line}");
+        for left in swings {
+            let most = if left["speed_rpm"] == 3_000.0 { fast } else { any };
+            assert!(left["link_swing"].as_f64().unwrap() < *most, "{line}: {left}");
         }
     });
 }
 
+/// A drive whose demand is beyond what the link gives damps it as well: the torque then follows the voltage limit, and the limit follows the link's
+/// swing. When the limit followed only the link's slow value, these swung by 6.5 and 3.1 %.
 #[test]
 fn a_demand_beyond_what_the_link_gives_is_damped() {
     for command in [

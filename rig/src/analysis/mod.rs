@@ -12,7 +12,7 @@ pub use transition::{FlyingStart, Transition, catch, transition};
 
 use crate::rows::{between, centred_means};
 use crate::trace::{Recorded, Recording, Row, name_of};
-use crate::verdict::FALLS_SHORT;
+use crate::verdict::{FALLS_SHORT, Verdict, worst};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use tractive::protection::Trip;
@@ -98,6 +98,14 @@ pub fn link_swing(rows: &[Row]) -> f64 {
     let links = || rows.iter().map(|row| row.udc_v);
     let (low_v, high_v) = (links().fold(f64::INFINITY, f64::min), links().fold(0.0, f64::max));
     (high_v - low_v) / (high_v + low_v)
+}
+
+/// Largest swing of the link behind a line filter in steady state, as a share of its voltage.
+const MOST_LINK_SWING: f64 = 0.03;
+
+/// The verdict on the largest of some swings of the link, each as a share of its voltage, under the name of what is judged.
+pub fn swing_verdict(what: &str, swings: impl Iterator<Item = f64>) -> Verdict {
+    Verdict::at_most(&format!("{what} (share of its voltage)"), worst(swings), MOST_LINK_SWING)
 }
 
 /// The largest number of turn-ons of any one device in any window of this length.

@@ -72,6 +72,19 @@ impl Default for PlantSettings {
     }
 }
 
+impl PlantSettings {
+    /// The machine's folder with its true flux map and its true resistance.
+    pub fn folder(&self, machine: &MachineFolder) -> MachineFolder {
+        let mut truth = machine.clone();
+        let magnet_wb = self.flux_scale * SmoothMap::new(&machine.map).at(0.0, 0.0).psi_d_wb;
+        let lost_wb = (1.0 - self.magnet_scale) * magnet_wb;
+        truth.map.psi_d_wb.iter_mut().for_each(|psi_wb| *psi_wb = *psi_wb * self.flux_scale - lost_wb);
+        truth.map.psi_q_wb.iter_mut().for_each(|psi_wb| *psi_wb *= self.flux_scale);
+        truth.parameters.stator_resistance_ohm *= self.resistance_scale;
+        truth
+    }
+}
+
 /// Machine and legs.
 pub struct Plant {
     /// The machine.

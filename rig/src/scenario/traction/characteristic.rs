@@ -1,5 +1,6 @@
 //! Torque accuracy, efficiency and current at the characteristic points: the paper's figure 10.
 
+use super::host::true_machine;
 use super::plan::LEAD_S;
 use super::prelude::*;
 use super::scaled::{of_rated_rpm, scaled_nm};
@@ -77,9 +78,10 @@ impl Scenario<Traction> for Characteristic {
 
     fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let points = points(recording, machine);
+        let truth = true_machine(options, machine);
         let beside = slots(machine).into_iter().map(|slot| {
             let window = (slot.ends_s - MEASURE_S, slot.ends_s);
-            bound::beside(recording, window, options, machine)
+            bound::beside(recording, window, options, &truth)
         });
         let beside: Vec<_> = beside.flatten().collect();
         let mut figures = analysis::common(recording);
@@ -104,10 +106,11 @@ impl Scenario<Traction> for Characteristic {
             let window = (slot.ends_s - 0.04, slot.ends_s);
             page.zoom(&format!("{} r/min, {} N·m", slot.speed_rpm, slot.torque_nm), recording, window);
         }
+        let truth = true_machine(options, machine);
         for slot in slots(machine) {
             let title = format!("{} r/min, {} N·m", slot.speed_rpm, slot.torque_nm);
             let window = (slot.ends_s - MEASURE_S, slot.ends_s);
-            spectrum::draw(page, recording, (&title, window), options, machine);
+            spectrum::draw(page, recording, (&title, window), options, &truth);
         }
         figures::draw(page, recording, &points(recording, machine), machine);
     }

@@ -4,7 +4,7 @@ use super::setup::{clock, first_half_ticks, tasks, udc_v};
 use super::{Options, Plan, drives};
 use crate::bench::{self, Bench, Flaws, Limits, Simulated, Supply};
 use crate::machine::Machine;
-use crate::plant::{FilteredLink, Plant};
+use crate::plant::{FilteredLink, Plant, PlantSettings};
 use crate::run::traction::{OnBench, Together};
 use crate::run::{self, Progress, Supervisor, ticks};
 use crate::trace::Recording;
@@ -90,6 +90,19 @@ pub(super) fn truth(options: &Options, machine: &Machine) -> Result<Machine> {
     options.own.plant.as_deref().map_or_else(|| Ok(machine.clone()), Machine::load)
 }
 
+/// The folder of the true machine, with the deviations that the options name, under the tables that control knows. If the folder is gone since the run, it
+/// is that of the machine that control knows.
+pub(super) fn true_machine(options: &Options, machine: &Machine) -> Machine {
+    let truth = truth(options, machine).unwrap_or_else(|_| machine.clone());
+    let folder = deviations(options, &truth).folder(&truth.folder);
+    Machine { folder, tables: machine.tables }
+}
+
+/// The deviations of the true machine from its folder.
+fn deviations(options: &Options, truth: &Machine) -> PlantSettings {
+    options.own.flaws.plant(options.plant(), truth.folder.parameters.rotor_inertia_kg_m2)
+}
+
 /// The bench with the machine that control knows, and the true one.
 pub(super) fn bench(
     plan: Plan,
@@ -134,8 +147,7 @@ pub(super) fn bench(
         injection: plan.injection,
         limits: Limits::NONE,
     };
-    let deviations = own.plant(options.plant(), truth.folder.parameters.rotor_inertia_kg_m2);
-    let mut plant = Plant::new(&truth.folder, plan.speed, &deviations);
+    let mut plant = Plant::new(&truth.folder, plan.speed, &deviations(options, truth));
     plant.motor.rotor_mut().set_friction_nm(options.own.friction);
     if let Some(encoder) = plan.encoder {
         plant.motor.rotor_mut().turn_to(encoder.turns());

@@ -1,5 +1,6 @@
 //! Full power reversed in one step in square wave, released in deep weakening, and applied again.
 
+use super::host::true_machine;
 use super::prelude::*;
 use super::scaled::scaled_rpm;
 use super::script::{BEGIN_S, Script};
@@ -65,6 +66,7 @@ impl Scenario<Traction> for Reversal {
         }
         let end_s = BEGIN_S + HOLD_S;
         let window = (end_s - 0.5 * HOLD_S, end_s);
-        spectrum::draw(page, recording, ("full power", window), options, machine);
+        let truth = true_machine(options, machine);
+        spectrum::draw(page, recording, ("full power", window), options, &truth);
     }
 }

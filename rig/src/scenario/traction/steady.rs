@@ -1,6 +1,7 @@
 //! One operating point in steady state: distortion and torque ripple compared with what the pulses allow.
 
 use super::TractionOptions;
+use super::host::true_machine;
 use super::prelude::*;
 use super::scaled::{carrier_step_s, scaled_nm, scaled_rpm};
 use super::script::Script;
@@ -49,11 +50,12 @@ impl Scenario<Traction> for Steady {
         let steady = analysis::steady_point(recording, window, torque_nm, &machine.folder);
         let measured = distortion::of_recording(recording, window, &machine.folder);
         figures.set("harmonics", measured.harmonics());
-        let beside: Vec<_> = bound::beside(recording, window, options, machine).into_iter().collect();
+        let truth = true_machine(options, machine);
+        let beside: Vec<_> = bound::beside(recording, window, options, &truth).into_iter().collect();
         let mut verdicts = bound::verdicts(&beside, options).to_vec();
         if options.own.line.is_some() {
             let swing = analysis::link_swing(analysis::window(recording, window.0, window.1));
-            verdicts.push(Verdict::at_most("swing of the link (share of its voltage)", swing, 0.03));
+            verdicts.push(analysis::swing_verdict("swing of the link", [swing].into_iter()));
         }
         if options.dead_time_us > 0.0 {
             let (speed_rpm, point_nm) = DEAD_TIME_POINT;
@@ -87,7 +89,8 @@ impl Scenario<Traction> for Steady {
         let window = (SETTLE_S, SETTLE_S + 0.04);
         page.zoom("steady state", recording, window);
         let window = (SETTLE_S, SETTLE_S + MEASURE_S);
-        spectrum::draw(page, recording, ("steady state", window), options, machine);
+        let truth = true_machine(options, machine);
+        spectrum::draw(page, recording, ("steady state", window), options, &truth);
     }
 }
 

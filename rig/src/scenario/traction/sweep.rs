@@ -1,5 +1,6 @@
 //! Full torque from standstill through every mode: the paper's figure 9.
 
+use super::host::true_machine;
 use super::plan::LEAD_S;
 use super::prelude::*;
 use super::scaled::sweep_rpm_s;
@@ -89,7 +90,8 @@ impl Scenario<Traction> for Sweep {
         let hold = |row: &&Row| fastest > 0.0 && row.speed_rpm.abs() > 0.999_999 * fastest;
         if let Some(end) = recording.rows.iter().rev().find(hold) {
             let (title, window) = (format!("{fastest:.0} r/min"), (end.t_s - 0.5 * HOLD_S, end.t_s));
-            spectrum::draw(page, recording, (&title, window), options, machine);
+            let truth = true_machine(options, machine);
+            spectrum::draw(page, recording, (&title, window), options, &truth);
         }
     }
 }
