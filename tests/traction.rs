@@ -32,6 +32,8 @@ struct Motor<'a> {
     command: DriveCommand,
     /// `true` if the sensor only counts, of a rotor that stands.
     counts: bool,
+    /// `true` if an operator is asked, whose command is then this motor's all the same.
+    operated: bool,
     played: CarrierHalf,
     entered: Vec<(SafeState, u32)>,
     report: Report,
@@ -47,6 +49,7 @@ impl<'a> Motor<'a> {
             late: None,
             command: DriveCommand::NONE,
             counts: false,
+            operated: false,
             played: CarrierHalf::default(),
             entered: Vec::new(),
             report: Report::default(),
@@ -108,7 +111,10 @@ impl ControlPort for Motor<'_> {
         sample
     }
 
-    fn command(&mut self, _now: Instant, _operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+    fn command(&mut self, _now: Instant, operator: impl FnOnce() -> DriveCommand) -> DriveCommand {
+        if self.operated {
+            operator();
+        }
         self.command
     }
 
@@ -237,6 +243,26 @@ fn a_machine_whose_temperatures_are_no_longer_known_is_as_rated() {
     let apart = |end| (current(&warm, end) - current(&cold, end)).length();
     let [before, warm, after] = [WARM.start, WARM.start + SETTLED / 8, WARM.end + 2 * SETTLED].map(apart);
     assert!(before == 0.0 && warm > 1e-3 && after < 1e-3, "{before} {warm} {after}");
+}
+
+/// The zero moves in every slot in which it is to be calibrated, and stays afterwards.
+#[test]
+fn a_zero_is_calibrated_as_long_as_it_is_ordered() {
+    const ORDERED: core::ops::Range<u32> = 2 * SETTLED..3 * SETTLED;
+    let order = |at: u32, _: &mut Sample, command: &mut DriveCommand| {
+        (command.calibrate, command.demand.torque_nm) = (ORDERED.contains(&at), 0.0);
+    };
+    let at = |end| {
+        let mut motor = Motor { operated: true, ..Motor::new(400.0, &order) };
+        assert_eq!(motor.runs(settings(900.0), end), None);
+        (motor.report.calibrating, motor.report.angle_zero)
+    };
+    let ends =
+        [ORDERED.start, ORDERED.end - SETTLED / 2, ORDERED.end, ORDERED.end + SETTLED / 8, 4 * SETTLED];
+    let [before, amid, last, after, later] = ends.map(at);
+    assert_eq!(before, (false, Angle::ZERO));
+    assert!(amid.0 && last.0 && amid.1 != Angle::ZERO && amid.1 != last.1, "{amid:?} {last:?}");
+    assert!(!after.0 && after == later, "{after:?} {later:?}");
 }
 
 /// Largest change of the torque's reference that a swinging link makes.

@@ -76,7 +76,7 @@ impl<D: MessageSet> Sender<D> {
             (8, 1) if D::FROM_DRIVE.len() > TEMPERATURES => {
                 (TEMPERATURES, TemperaturesFrame::from(temperatures?).encode())
             }
-            (8, 2) if D::FROM_DRIVE.len() > ANGLE_ZERO => (ANGLE_ZERO, D::measured(measured, 4, scales)),
+            (8, 2) => (ANGLE_ZERO, D::measured(measured, 4, scales)),
             (8, 3) => {
                 let [value, _] = trip_frames(trip?);
                 (FAULT_VALUE, value)

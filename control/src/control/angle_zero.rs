@@ -101,6 +101,22 @@ mod tests {
         }
     }
 
+    /// A tenth of the EMF along d is a tenth of a radian: 250 rad/s and 0.4 Wb are 100 V.
+    #[test]
+    fn the_error_is_what_is_unexplained_over_the_emf() {
+        let unexplained_v = Dq { d: 10.0, q: 50.0 };
+        let rest = WithoutTorque {
+            unexplained_v,
+            omega: 250.0,
+            max_omega: MAX_OMEGA,
+            magnets_wb: 0.4,
+            length_s: 0.01,
+        };
+        let mut zero = AngleZero::NONE;
+        zero.learn(&rest);
+        assert!((zero.angle().signed_radians() / (0.1 * RATE * 0.01) - 1.0).abs() < 1e-4, "{zero:?}");
+    }
+
     /// Voltages that are no numbers, or without magnets, move nothing out of bounds.
     #[test]
     fn no_step_is_beyond_the_rate() {

@@ -284,6 +284,31 @@ mod tests {
     use crate::modulation::SwitchLimits;
     use crate::time::Clock;
 
+    /// The zero is calibrated if it is asked for, with pulses, without torque, in a mode with a carrier, and from a twentieth of the largest speed on: 126 rad/s.
+    #[test]
+    fn a_zero_is_calibrated_where_it_shows() {
+        let clock = Clock::new(25_000_000, 2_500);
+        let settings = Settings::new(clock, SwitchLimits::new(250, 0, 900.0, &clock));
+        let calibrating = |calibrate, pulsing, torque_nm, mode, omega: f32| {
+            let mut task = ControlTask::new(&BUILT_IN, settings, Instant(2_500));
+            for period in 0..2 {
+                let angle = Angle::within_half_turn(omega * clock.control_s() * period as f32);
+                task.controller.track(angle, &clock);
+            }
+            (task.mode, task.calibrating) = (mode, true);
+            let demand = Demand { torque_nm, slew_limited: true };
+            task.calibrate(&DriveCommand { calibrate, demand, ..DriveCommand::NONE }, pulsing);
+            task.calibrating
+        };
+        assert!(calibrating(true, true, 0.0, Mode::Async, 200.0));
+        assert!(calibrating(true, true, 0.0, Mode::Sync15, -200.0));
+        assert!(!calibrating(false, true, 0.0, Mode::Async, 200.0));
+        assert!(!calibrating(true, false, 0.0, Mode::Async, 200.0));
+        assert!(!calibrating(true, true, 1.0, Mode::Async, 200.0));
+        assert!(!calibrating(true, true, 0.0, Mode::Square, 200.0));
+        assert!(!calibrating(true, true, 0.0, Mode::Async, 100.0));
+    }
+
     /// The mode that pulses would begin with follows from the machine's own EMF, and the start's pulses turn with the machine from the instant of the
     /// currents.
     #[test]
