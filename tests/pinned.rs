@@ -178,8 +178,8 @@ fn walk<L: ControlLaw>(mut law: L, name: &str, number: u32, out: &mut String) {
         }
         if period % 5 == 4 {
             let passed_s = law.passed_s(&clock);
-            let swing =
-                (number & 1 != 0).then(|| damper.step(walk.udc_v, passed_s, omega, walk.limits.follows));
+            let swing = (number & 1 != 0)
+                .then(|| damper.step(walk.udc_v, passed_s, omega, (walk.limits.follows, false)));
             let plain = AimInput::plain(&walk.demand, walk.udc_v, &walk.limits);
             law.aim(&AimInput { window: walk.window.as_ref(), swing, ..plain }, &law_of);
             let committed = walk.committed();

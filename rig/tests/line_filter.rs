@@ -198,6 +198,8 @@ fn steps_of_the_line_die_out() {
         ("1,2,10", 0.01, 0.15),
         ("8,2,10", 0.01, 0.04),
         ("8,8,10", 0.07, 0.13),
+        ("3,4,30 --patterns optimal", 0.02, 0.035),
+        ("1,2,10 --patterns optimal", 0.01, 0.01),
     ];
     lines.par_iter().for_each(|(line, fast, any)| {
         let chosen = catalogue::of_traction(&format!("link-steps --line {line}")).unwrap();

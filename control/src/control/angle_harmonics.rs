@@ -16,9 +16,11 @@ use crate::frames::{Angle, SinCos, limit_magnitude};
 const TURNS_BITS: u32 = 2;
 /// Speed from which an error is learnt, over the tracker's natural frequency: below it the tracker follows most of the error.
 const FROM: f32 = 0.4;
-/// Change of the speed over these turns up to which it counts as even, as a share: at 250 r/min a second that is from 500 r/min on. With a fiftieth, from
-/// 870 r/min on, 3° of once the angle made the modes hunt in a sweep.
+/// Change of the speed over these turns up to which it counts as even, as a share, and the most by which it may differ from the change over the turns before:
+/// a speed that rises evenly leaves nothing that repeats. At 250 r/min a second it is even from 500 r/min on; from 870 r/min on, with a fiftieth for both, 3° of
+/// once the angle made the modes hunt in a sweep.
 const EVEN: f32 = 0.06;
+const STEADY: f32 = 0.02;
 /// Share of a measured error that is added to the known one.
 const GAIN: f32 = 0.5;
 /// Known error that is left alone, as the root of the sum of squares, in rad: 0.1°, which an encoder's counts may look like. It is half of the error,
@@ -80,8 +82,9 @@ pub struct AngleHarmonics {
     /// Way of the angle since these began: a turn is 2³² over the turns of a measurement.
     way: u32,
     last: Angle,
-    /// Electrical speed at their beginning, in rad/s; 0 if that was no valid beginning.
+    /// Electrical speed at their beginning, in rad/s; 0 if that was no valid beginning; and its change over the turns before.
     omega: f32,
+    change: f32,
     /// `true` if the known errors are worth removing.
     used: bool,
     /// `true` once these or the zero have been.
@@ -102,6 +105,7 @@ impl AngleHarmonics {
             way: 0,
             last: Angle::ZERO,
             omega: 0.0,
+            change: 0.0,
             used: false,
             corrects: false,
             zero: AngleZero::NONE,
@@ -189,7 +193,10 @@ impl AngleHarmonics {
     #[inline(never)]
     fn end(&mut self, tracker: &SpeedTracker) {
         let (omega, natural) = (tracker.omega(), tracker.natural_rad_s());
-        let even = (omega - self.omega).abs() < EVEN * omega.abs();
+        let change = omega - self.omega;
+        let is_steady = (change - self.change).abs() < STEADY * omega.abs();
+        let even = is_steady && change.abs() < EVEN * omega.abs();
+        self.change = if self.omega == 0.0 { 0.0 } else { change };
         let samples = self.samples;
         let per_sample = 1.0 / samples as f32;
         let [once, twice] =
@@ -402,9 +409,30 @@ mod tests {
         for (omega, even) in [(before, false), (0.5 * (before + tracker(period_s, 500.0).omega()), true)] {
             let mut harmonics = AngleHarmonics::new(0.0);
             (harmonics.omega, harmonics.samples) = (omega, 1);
+            harmonics.change = tracker(period_s, 500.0).omega() - omega;
             harmonics.sums[0].cos = 0.01;
             harmonics.end(&tracker(period_s, 500.0));
             assert_eq!(harmonics.used, even, "from {omega} rad/s");
         }
+    }
+
+    /// 1,000 rad/s, after a rise by 5 %: as much before is even, and so is a little less or more; a speed that stood, and one that began anew, are not.
+    #[test]
+    fn a_speed_that_rises_as_before_is_even() {
+        let now = tracker(0.5e-3, 500.0);
+        let omega = 0.95 * now.omega();
+        for (change, even) in
+            [(50.0, true), (32.0, true), (68.0, true), (28.0, false), (72.0, false), (0.0, false)]
+        {
+            let mut harmonics = AngleHarmonics::new(0.0);
+            (harmonics.omega, harmonics.samples, harmonics.change) = (omega, 1, change);
+            harmonics.sums[0].cos = 0.01;
+            harmonics.end(&now);
+            assert_eq!((harmonics.used, harmonics.change), (even, now.omega() - omega), "{change} rad/s");
+        }
+        let mut harmonics = AngleHarmonics { change: 50.0, ..AngleHarmonics::new(0.0) };
+        harmonics.samples = 1;
+        harmonics.end(&now);
+        assert_eq!((harmonics.change, harmonics.used), (0.0, false));
     }
 }

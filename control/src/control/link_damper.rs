@@ -7,7 +7,8 @@
 //! damped.
 //!
 //! A wide swing, such as a step of the line leaves, meets limits: torque cannot rise above the largest, so only the half of the swing that lies below
-//! damps. So its middle falls until there is room for both, and in square wave, whose largest torque is the one asked for, torque follows quickly. Without
+//! damps; where the field is weakened, the torque asked for is the largest that the voltage gives. So its middle falls until there is room for both, and in square
+//! wave torque follows quickly. Without
 //! this law a step of 200 V at full power and 3,000 r/min left swings of 220 V behind 3 mH and 4 mF, and the next one tripped.
 
 use super::Regulated;
@@ -34,8 +35,8 @@ pub struct LinkSwing {
     pub share: f32,
     /// The link with that part of its swing, in V.
     pub udc_v: f32,
-    /// Amplitude of a wide swing, less that of the widest narrow one, as a share of the link's voltage; 0: narrow. Below 0: its negative, in a mode that can make
-    /// more torque than is asked for, which square wave cannot.
+    /// Amplitude of a wide swing, less that of the widest narrow one, as a share of the link's voltage; 0: narrow. Below 0: its negative, where the voltage gives
+    /// more torque than is asked for, as it does unless the field is weakened.
     pub wide: f32,
 }
 
@@ -70,18 +71,32 @@ impl LinkDamper {
         Self { slow_v, share: 0.0, amplitude: 0.0 }
     }
 
-    /// The swing of the link at `udc_v`, above zero, a time in s after the last step, in a mode that follows so much of a command.
+    /// The swing of the link at `udc_v`, above zero, a time in s after the last step, in a mode that follows so much of a command, with the field weakened or not.
     #[inline(always)]
-    pub fn step(&mut self, udc_v: f32, period_s: f32, omega: f32, follows: Regulated) -> LinkSwing {
+    pub fn step(
+        &mut self,
+        udc_v: f32,
+        period_s: f32,
+        omega: f32,
+        (follows, weakened): (Regulated, bool),
+    ) -> LinkSwing {
         self.slow_v += SLOW_RAD_S * period_s * (udc_v - self.slow_v);
         let share = udc_v / self.slow_v - 1.0;
         let faded = self.amplitude * (1.0 - FADES_RAD_S * period_s);
         self.amplitude = if share.abs() > faded { share.abs() } else { faded };
         let excess = self.amplitude - CALM;
-        let (share, wide) = match (follows, excess > 0.0) {
-            (Regulated::Angle, true) => (self.followed(WIDE_SHARE * omega, period_s, share), excess),
-            (Regulated::Angle, false) => (self.followed(SQUARE_SHARE * omega, period_s, share), 0.0),
-            (_, is_wide) => (share, if is_wide { -excess } else { 0.0 }),
+        let is_wide = excess > 0.0;
+        let share = match follows {
+            Regulated::Angle if is_wide => self.followed(WIDE_SHARE * omega, period_s, share),
+            Regulated::Angle => self.followed(SQUARE_SHARE * omega, period_s, share),
+            _ => share,
+        };
+        let wide = if !is_wide {
+            0.0
+        } else if weakened {
+            excess
+        } else {
+            -excess
         };
         self.share = share;
         LinkSwing { share, wide, udc_v: self.slow_v * (1.0 + share) }
@@ -104,12 +119,24 @@ mod tests {
         let (mut damper, mut followed) = (LinkDamper::at(1_000.0), [0.0; 2]);
         for (volts, periods) in [(1_020.0, 0), (1_100.0, 1)] {
             damper = LinkDamper::at(1_000.0);
-            damper.step(volts, 1e-3, 1_257.0, Regulated::Angle);
+            damper.step(volts, 1e-3, 1_257.0, (Regulated::Angle, true));
             followed[periods] = damper.share / (volts / damper.slow_v - 1.0);
         }
         assert!((followed[0] - 0.151).abs() < 1e-3 && (followed[1] - 1.257).abs() < 1e-3, "{followed:?}");
-        let calm = (1..).find(|_| damper.step(damper.slow_v, 1e-3, 1_257.0, Regulated::Angle).wide == 0.0);
+        let calm =
+            (1..).find(|_| damper.step(damper.slow_v, 1e-3, 1_257.0, (Regulated::Angle, true)).wide == 0.0);
         assert!((110..=125).contains(&calm.unwrap()), "{calm:?}");
+    }
+
+    /// A step by a tenth: 0.07 beyond a narrow swing, less what the slow value has followed.
+    #[test]
+    fn room_is_made_whatever_the_torque_in_weakening_alone() {
+        for follows in [Regulated::Mean, Regulated::Fundamental, Regulated::Angle] {
+            let wide = [true, false].map(|weakened| {
+                LinkDamper::at(1_000.0).step(1_100.0, 1e-6, 1_257.0, (follows, weakened)).wide
+            });
+            assert!((wide[0] - 0.07).abs() < 1e-4 && wide[1] == -wide[0], "{follows:?}: {wide:?}");
+        }
     }
 
     #[test]

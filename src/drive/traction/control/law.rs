@@ -161,7 +161,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let torque_nm = self.exit.one_sided(command.demand.torque_nm, emf_v, udc_v, &tables.ratings);
         let demand = Demand { torque_nm, ..command.demand };
         let damps = gains.link_damping > 0.0;
-        let swing = damps.then(|| self.damper.step(udc_v, passed_s, omega, self.limits.follows));
+        let weakened = self.modulation_index > self.limits.steady_limit;
+        let swing = damps.then(|| self.damper.step(udc_v, passed_s, omega, (self.limits.follows, weakened)));
         let window = Some(&command.window);
         let aim = AimInput {
             demand: &demand,
