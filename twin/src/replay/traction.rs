@@ -143,6 +143,7 @@ impl Tasks for Host {
             window: LinkWindow { motoring_none_v, motoring_full_v, braking_full_v, braking_none_v },
             acknowledge: (flags >> 8) as u8,
             warmth: Warmth::from_word((flags >> 16) as u16),
+            calibrate: flags & 4 != 0,
         });
     }
 
