@@ -280,6 +280,27 @@ fn swung_nm(link_damping: f32) -> f32 {
     torques.iter().copied().fold(f32::MIN, f32::max) - torques.iter().copied().fold(f32::MAX, f32::min)
 }
 
+/// Mean torque over a link's swing by a tenth, in N·m, of a machine that turns at an electrical speed in rad/s.
+fn mean_in_a_wide_swing_nm(omega: f32) -> f32 {
+    let swing = |at: u32, sample: &mut Sample, _: &mut DriveCommand| {
+        sample.udc_v = 1_500.0 + 150.0 * (TAU * 40.0 * at as f32 / 25e6).sin();
+    };
+    let settings = Settings { gains: Gains { link_damping: 3.0, ..Gains::DEFAULT }, ..settings(900.0) };
+    let torque = |periods: u32| {
+        let mut motor = Motor::new(omega, &swing);
+        assert_eq!(motor.runs(settings, SETTLED + periods * 2_500), None);
+        motor.report.torque_nm
+    };
+    (0..25).map(|tenth| torque(10 * tenth)).sum::<f32>() / 25.0
+}
+
+/// Room for the swing is made where the field is weakened; below, the largest torque leaves enough.
+#[test]
+fn a_wide_swing_takes_torque_in_weakening_alone() {
+    let [below, beyond] = [400.0, 1_600.0].map(mean_in_a_wide_swing_nm);
+    assert!(below > 195.0 && beyond < 185.0, "{below} {beyond}");
+}
+
 #[test]
 fn a_link_that_swings_is_damped_by_torque_where_it_is_wanted() {
     let [without, with] = [0.0, 1.0].map(swung_nm);
