@@ -226,7 +226,8 @@ fn every_scalar_of_the_zs9() {
     let speed = fields!(SpeedDesign as SpeedDesign { inertia_kg_m2, natural_rad_s, period_s | }: f32);
     try_all(settings, "speed.", speed, |settings| &mut settings.speed, check);
     let link = fields!(ZSourceDesign as ZSourceDesign {
-        inductance_h, resistance_ohm, capacitance_f, period_s, inner_hz, outer_hz, link_slew_v_s, duty_max, inductor_max_a |
+        inductance_h, resistance_ohm, capacitance_f, period_s, inner_hz, outer_hz, link_slew_v_s, duty_max, inductor_max_a,
+        damping_s |
     }: f32);
     try_all(settings, "link.", link, |settings| &mut settings.link, check);
     let link_gains = fields!(ZSourceGains as ZSourceGains { inner_ohm, outer_s, integral_share | }: f32);

@@ -165,10 +165,9 @@ fn walk(carrier_ticks: u32, dead_time_ticks: u32, seed: u64, out: &mut String) {
     let unexplained = MaskedFaults::of(Fault::VoltageUnexplained);
     let mut control = ControlTask::new(&BUILT_IN, usual).without(unexplained);
     let mut pwm = PwmTask::new(&BUILT_IN, usual);
-    control.set_carrier(carrier_ticks);
-    pwm.set_carrier(carrier_ticks);
-    pwm.set_dead_time(dead_time_ticks);
     let settings = Settings { carrier_ticks, dead_time_ticks, ..usual };
+    control.set_up(Settings { dead_time_ticks: 0, ..settings });
+    pwm.set_up(settings);
     let off = PlayedPeriod::off(settings.half_steps());
     let mut board = Board {
         random: seed,

@@ -116,6 +116,8 @@ fn a_trip_is_the_same() {
 fn both_motors_load_step_is_the_same() {
     same("zs9-load-step", 0);
     same("zs9-load-step --carrier-hz 20000 --uin 800 --scheme s", 0);
+    // Behind a line filter that the capacitors damp.
+    same("zs9-timing --line 3,4,30", 0);
 }
 
 #[test]

@@ -143,6 +143,7 @@ const fn check_link(link: &ZSourceDesign, control_s: f32) -> Result<(), Refused>
         link_slew_v_s,
         duty_max,
         inductor_max_a,
+        damping_s,
     } = *link;
     within(&[
         Bound("link.inductance_h", inductance_h, ABOVE_ZERO, 0.1),
@@ -154,6 +155,7 @@ const fn check_link(link: &ZSourceDesign, control_s: f32) -> Result<(), Refused>
         Bound("link.link_slew_v_s", link_slew_v_s, ABOVE_ZERO, 1e5),
         Bound("link.duty_max", duty_max, ABOVE_ZERO, 0.5 - ROUNDING),
         Bound("link.inductor_max_a", inductor_max_a, ABOVE_ZERO, 1e4),
+        Bound("link.damping_s", damping_s, 0.0, 1e3),
     ])
 }
 

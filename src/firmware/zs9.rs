@@ -3,7 +3,7 @@
 
 use crate::law::{self, Law};
 use crate::qemu::{self, CLOCK, Interrupt as interrupt};
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception, interrupt};
 use tractive::built_in::zs9::{BUILT_IN, BuiltIn};
 use tractive::drive::dual::{ControlTask, PwmTask, Settings, Shared};
@@ -18,6 +18,7 @@ const DEFAULTS: Settings = Settings::new(CLOCK, CLOCK.control_ticks, &BUILT_IN);
 static RATINGS: Ratings = Settings::operator_ratings(&BUILT_IN.ratings);
 static CARRIER_TICKS: AtomicU32 = AtomicU32::new(0);
 static DEAD_TIME_TICKS: AtomicU32 = AtomicU32::new(0);
+static BEHIND_LINE_FILTER: AtomicBool = AtomicBool::new(false);
 
 fn settings() -> Settings {
     Settings {
@@ -25,6 +26,7 @@ fn settings() -> Settings {
         dead_time_ticks: DEAD_TIME_TICKS.load(Ordering::Relaxed),
         ..DEFAULTS
     }
+    .behind_line_filter(BEHIND_LINE_FILTER.load(Ordering::Relaxed), &BUILT_IN)
 }
 
 #[entry]
@@ -33,7 +35,8 @@ fn main() -> ! {
     let setup = qemu::connect_dual();
     CARRIER_TICKS.store(setup.carrier_ticks, Ordering::Relaxed);
     DEAD_TIME_TICKS.store(setup.dead_time_ticks, Ordering::Relaxed);
-    // All but carrier and dead time are constants of the image.
+    BEHIND_LINE_FILTER.store(setup.behind_line_filter, Ordering::Relaxed);
+    // All but carrier, dead time and damping are constants of the image.
     let constants = const { DEFAULTS.check(&BUILT_IN) };
     if let Err(refused) = constants.and_then(|()| settings().check_carrier()) {
         qemu::refuse(&refused);
@@ -60,8 +63,7 @@ fn TIMER0() {
     static mut IS_SET_UP: bool = false;
     let mut board = qemu::Control;
     if !*IS_SET_UP {
-        TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
-        TASK.set_dead_time(DEAD_TIME_TICKS.load(Ordering::Relaxed));
+        TASK.set_up(settings());
         *IS_SET_UP = true;
     }
     TASK.run(&mut board, &SHARED);
@@ -74,8 +76,7 @@ fn DUALTIMER() {
     static mut IS_SET_UP: bool = false;
     let mut board = qemu::Pwm;
     if !*IS_SET_UP {
-        TASK.set_carrier(CARRIER_TICKS.load(Ordering::Relaxed));
-        TASK.set_dead_time(DEAD_TIME_TICKS.load(Ordering::Relaxed));
+        TASK.set_up(settings());
         *IS_SET_UP = true;
     }
     TASK.run(&mut board, &SHARED);

@@ -24,6 +24,8 @@ pub struct DualSetup {
     pub dead_time_ticks: u32,
     /// The line side that the operator switches; `None`: no operator, the rig commands the drive directly.
     pub line: Option<LineTimes>,
+    /// `true` if the source is behind a line filter that the drive has to damp.
+    pub behind_line_filter: bool,
 }
 
 /// From the firmware to the rig.
@@ -120,13 +122,17 @@ fn told_of(report: &DualReport) -> [u32; 10] {
 
 /// The answer to [`DualRequest::Hello`].
 pub fn dual_setup_to_block(setup: DualSetup) -> Block {
-    filled([setup.carrier_ticks, setup.dead_time_ticks].into_iter().chain(line_to_words(setup.line)))
+    let DualSetup { carrier_ticks, dead_time_ticks, line, behind_line_filter } = setup;
+    let [present, precharge, discharge] = line_to_words(line);
+    let flags = present | u32::from(behind_line_filter) << 1;
+    filled([carrier_ticks, dead_time_ticks, flags, precharge, discharge])
 }
 
 /// The inverse of [`dual_setup_to_block`].
 pub fn dual_setup_from_block(block: &Block) -> DualSetup {
-    let [carrier_ticks, dead_time_ticks, a, b, c, ..] = *block;
-    DualSetup { carrier_ticks, dead_time_ticks, line: line_from_words([a, b, c]) }
+    let [carrier_ticks, dead_time_ticks, flags, precharge, discharge, ..] = *block;
+    let line = line_from_words([flags, precharge, discharge]);
+    DualSetup { carrier_ticks, dead_time_ticks, line, behind_line_filter: flags & 2 != 0 }
 }
 
 /// The answer to [`DualRequest::Ask`].
@@ -291,9 +297,10 @@ mod tests {
             gates: GateFeedback { on: 0x1A5, off: 0x05A },
         };
         assert_eq!(power_from_block(&power_to_block(&power)), power);
-        let setup = DualSetup { carrier_ticks: 2_500, dead_time_ticks: 125, line: None };
+        let setup =
+            DualSetup { carrier_ticks: 2_500, dead_time_ticks: 125, line: None, behind_line_filter: false };
         let line = Some(LineTimes { precharge_s: 0.05, discharge_s: 0.5 });
-        for setup in [setup, DualSetup { line, ..setup }] {
+        for setup in [setup, DualSetup { line, ..setup }, DualSetup { behind_line_filter: true, ..setup }] {
             assert_eq!(dual_setup_from_block(&dual_setup_to_block(setup)), setup);
         }
         let feedback = Feedback { main_closed: true, ..Feedback::default() };

@@ -264,8 +264,12 @@ fn a_line_filter_is_a_key_of_the_stage() {
     let said = TRACTION.check(&text.replace("control_hz = 10000", "control_hz = 40000"), TRACTION.tables);
     let said = said.unwrap_err();
     assert!(said.contains("control_hz: 40000: must be from 1000 to 28873"), "{said}");
-    let said = ZS9.check(&format!("behind_line_filter = true\n{}", ZS9.text), ZS9.tables).unwrap_err();
-    assert!(said.contains("behind_line_filter: the Z-source has chokes of its own"), "{said}");
+    let constant = ZS9.check(&ZS9.with("behind_line_filter", "true"), ZS9.tables).unwrap();
+    assert!(constant.contains("behind_line_filter: true,"), "{constant}");
+    let said = ZS9.check(&ZS9.text.replace("behind_line_filter", "# "), ZS9.tables).unwrap_err();
+    assert!(said.contains("behind_line_filter: is missing"), "{said}");
+    let conductance_s = |behind| zs9_rates::settings(ZS9.tables, behind).link.damping_s;
+    assert_eq!((conductance_s(false), conductance_s(true)), (0.0, 2.0 * 2.0 * 12.57e3 / 160e3));
 }
 
 /// The stage of extra-low voltage suits its machine, and the other one does not.

@@ -25,6 +25,7 @@ mod map_error;
 mod mtpa;
 mod pi;
 mod reference;
+mod source_damper;
 mod speed;
 mod speed_loop;
 mod torque_trim;

@@ -8,6 +8,7 @@
 //! about `r C U_in²/(2 L)`. Its bandwidth is bounded by the right-half-plane zero at `U_dc/(2 i_L L)` rad/s: energy must
 //! go into the inductors, away from the link, before there can be more of it in the capacitors.
 
+use super::source_damper::{CONDUCTANCE, SourceDamper};
 use crate::frames::limit;
 use crate::machine::{Ratings, ZSourceNetwork};
 use core::f32::consts::TAU;
@@ -34,6 +35,8 @@ pub struct ZSourceDesign {
     pub duty_max: f32,
     /// Largest inductor current that is asked for, either way, in A, above 0.
     pub inductor_max_a: f32,
+    /// Conductance that the capacitors are to a swing of the source, in S, from 0: it damps a line filter.
+    pub damping_s: f32,
 }
 
 /// Largest ratio of the outer loop's bandwidth to the zero in the right half-plane.
@@ -56,6 +59,7 @@ impl ZSourceDesign {
         duty_max: 0.3,
         // The motors' full power takes 60 A.
         inductor_max_a: 90.0,
+        damping_s: 0.0,
     };
 
     /// The design for a network and two identical machines, with the control period in s. The motors' full current is `i = 2 P/U_dc`; the zero in the right
@@ -80,6 +84,11 @@ impl ZSourceDesign {
             inductor_max_a: 1.5 * full_a,
             ..Self::ZS9
         }
+    }
+
+    /// Conductance that damps any line filter of 1 to 8 mH, 2 to 8 mF and 10 mΩ or more, in S.
+    pub const fn line_damping_s(network: &ZSourceNetwork, ratings: &Ratings) -> f32 {
+        CONDUCTANCE * 2.0 * ratings.max_power_w / (network.source_v * network.source_v)
     }
 
     /// The gains.
@@ -174,6 +183,8 @@ pub struct ZSource {
     link_ref_v: Option<f32>,
     /// Integral part of the inductor current, in A.
     integral_a: f32,
+    /// Of a source behind a line filter.
+    damper: SourceDamper,
 }
 
 /// Least link voltage that is divided by, as a share of the source's.
@@ -182,7 +193,7 @@ const LEAST_LINK_SHARE: f32 = 0.25;
 impl ZSource {
     /// Before the first step; the link's reference then begins where the link is.
     pub const fn new() -> Self {
-        Self { link_ref_v: None, integral_a: 0.0 }
+        Self { link_ref_v: None, integral_a: 0.0, damper: SourceDamper::at(0.0) }
     }
 
     /// One period: the duty for the next.
@@ -214,8 +225,11 @@ impl ZSource {
         let ratio = led_v * per_source;
 
         // Outer loop. While the reference moves, the capacitors' charging current is known beforehand.
-        let error_v = 0.5 * (led_v + source_v) - capacitor_v;
-        let moving_v_s = 0.5 * (led_v - at_least(from_v, source_v)) / design.period_s;
+        let before = if self.link_ref_v.is_some() { self.damper } else { SourceDamper::at(source_v) };
+        let capacitors = (design.capacitance_f, at_least(capacitor_v, source_v));
+        let (damper, moving) = before.step(source_v, capacitors, design.damping_s, design.period_s);
+        let error_v = 0.5 * (led_v + source_v) + damper.moved_v - capacitor_v;
+        let moving_v_s = 0.5 * (led_v - at_least(from_v, source_v)) / design.period_s + moving;
         let charging_a = design.capacitance_f * moving_v_s;
         let into_capacitor_a = gains.outer_s * error_v;
         let wanted_a = power_w * per_source + ratio * (charging_a + into_capacitor_a) + self.integral_a;
@@ -244,6 +258,7 @@ impl ZSource {
         if !(duty + link_v + led_v + inductor_ref_a + integral_a).is_finite() {
             return Err(ZSourceError::NotFinite);
         }
+        self.damper = damper;
         (self.link_ref_v, self.integral_a) = (Some(led_v), integral_a);
         Ok(ZSourceOutput { duty, link_v, link_ref_v: led_v, inductor_ref_a, limited })
     }

@@ -26,6 +26,12 @@ pub const SPEEDS: [Curve; 2] =
     [("motor 1", |row| row.motors[0].speed_rpm), ("motor 2", |row| row.motors[1].speed_rpm)];
 /// The voltages of the link and of the capacitors.
 pub const VOLTAGES: [Curve; 2] = [("U_in", |row| row.link_v), ("U_c", |row| row.capacitor_v)];
+/// The voltage of the source, and the current out of the line.
+const SOURCE: [Curve; 1] = [("U_dc", |row| row.source_v)];
+const LINE: [Curve; 1] = [("line current", |row| row.line_a.unwrap_or(0.0))];
+/// Time at the end of a run in which the swing of a source behind a line filter is told, and the shortest run in which it has died out by then, in s.
+const SETTLED_S: f64 = 0.1;
+const SHORTEST_S: f64 = 0.3;
 /// The current of the inductors.
 pub const INDUCTOR: [Curve; 1] = [("i_L", |row| row.inductor_a)];
 
@@ -37,7 +43,35 @@ pub fn common(recording: &Recording) -> Figures {
         phases.fold(0.0, |most: f64, current| most.max(current.abs()))
     };
     let simulated_s = rows.last().map_or(0.0, |row| row.t_s + step_s(recording));
-    Figures::of_run(simulated_s, recording.trip(), largest(rows, peak))
+    let mut figures = Figures::of_run(simulated_s, recording.trip(), largest(rows, peak));
+    let line_a = rows.iter().filter_map(|row| row.line_a).map(f64::abs).reduce(f64::max);
+    if let Some(line_a) = line_a {
+        figures.set("peak_line_current_a", line_a);
+        figures.set("lowest_source_v", -largest(rows, |row| -row.source_v));
+        figures.set("highest_source_v", largest(rows, |row| row.source_v));
+        if simulated_s >= SHORTEST_S {
+            let last = window(recording, simulated_s - SETTLED_S, f64::INFINITY);
+            figures.set(SOURCE_SWING, 100.0 * swing(last));
+        }
+    }
+    figures
+}
+
+/// Name of the swing of a source behind a line filter at the end of a run, in % of its voltage.
+pub const SOURCE_SWING: &str = "source_swing_percent";
+
+/// Swing of the source over some rows: half of it from crest to trough, as a share of its mean.
+pub fn swing(rows: &[Row]) -> f64 {
+    let (high, low) = (largest(rows, |row| row.source_v), -largest(rows, |row| -row.source_v));
+    0.5 * (high - low) / mean(rows, |row| row.source_v)
+}
+
+/// Voltage of the source and current out of the line; none without a line filter.
+pub fn line(page: &mut Page, recording: &Recording) {
+    if recording.rows.iter().any(|row| row.line_a.is_some()) {
+        page.plot_rows("source", "V", &recording.rows, &SOURCE);
+        page.plot_rows("current out of the line", "A", &recording.rows, &LINE);
+    }
 }
 
 /// The range of the link voltage in some rows, in which `wanted_v` (V) is demanded.

@@ -60,8 +60,10 @@ pub struct Row {
     pub capacitor_v: f64,
     /// Inductor current, mean of both, in A.
     pub inductor_a: f64,
-    /// Source voltage, in V.
+    /// Source voltage, in V; that of a line filter's capacitor, if there is one.
     pub source_v: f64,
+    /// Current out of the line at the step's end, in A; `None` without a line filter.
+    pub line_a: Option<f64>,
     /// Share of the step in which a leg shorted the link.
     pub duty: f64,
     /// The place of the zero vectors.
@@ -97,7 +99,7 @@ impl Timed for Row {
 }
 
 impl Row {
-    fn columns(&self) -> Columns<26> {
+    fn columns(&self) -> Columns<27> {
         let [one, two] = &self.motors;
         let number = |value: f64| Cell::plain(value as f32);
         let [a1, b1, c1] = one.phases_a.map(number);
@@ -114,6 +116,7 @@ impl Row {
             il_a: number(self.inductor_a), udc_v: number(self.source_v),
             d_sh: number(self.duty), scheme: self.scheme.name(),
             tl1_nm: number(one.load_nm), tl2_nm: number(two.load_nm), fault: name_of(self.trip),
+            line_a: self.line_a.map_or(Cell::Missing, number),
         }
     }
 }

@@ -98,14 +98,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self
     }
 
-    /// Sets another dead time, in ticks; before the first call.
-    pub fn set_dead_time(&mut self, dead_time_ticks: u32) {
-        self.settings.dead_time_ticks = dead_time_ticks;
-    }
-
-    /// Sets another carrier period than that of the settings it was built with, in ticks; before the first call.
-    pub fn set_carrier(&mut self, carrier_ticks: u32) {
-        self.settings.carrier_ticks = carrier_ticks;
+    /// Sets other settings than those that it was built with, with the same clock; before the first call.
+    pub fn set_up(&mut self, settings: Settings) {
+        self.settings = settings;
     }
 
     /// The control timer's interrupt, at a valley of the carrier. Deadline: [`Settings::deadline_ticks`] after its nominal instant, when the command

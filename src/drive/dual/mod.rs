@@ -101,6 +101,13 @@ impl Settings {
         }
     }
 
+    /// The same for a source that is behind a line filter, whose swing the capacitors then damp, or that is not.
+    pub const fn behind_line_filter(mut self, behind: bool, tables: &Tables) -> Self {
+        let Tables { ratings, z_source, .. } = tables;
+        self.link.damping_s = if behind { ZSourceDesign::line_damping_s(z_source, ratings) } else { 0.0 };
+        self
+    }
+
     /// The ratings as the operator uses them: link voltages are those of the capacitors, with the drive's own trip levels.
     pub const fn operator_ratings(ratings: &Ratings) -> Ratings {
         Ratings {

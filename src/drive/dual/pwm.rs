@@ -68,17 +68,11 @@ impl<M: Machine> PwmTask<M> {
         self
     }
 
-    /// Sets another carrier period than that of the settings it was built with, in ticks; before the first call.
-    pub fn set_carrier(&mut self, carrier_ticks: u32) {
-        self.settings.carrier_ticks = carrier_ticks;
-        self.longest_pause_steps = self.settings.longest_pause_steps();
-        self.now = Instant(self.settings.first_peak_ticks());
-    }
-
-    /// Sets another dead time, in ticks; before the first call.
-    pub fn set_dead_time(&mut self, dead_time_ticks: u32) {
-        self.settings.dead_time_ticks = dead_time_ticks;
-        self.longest_pause_steps = self.settings.longest_pause_steps();
+    /// Sets other settings than those that it was built with; before the first call.
+    pub fn set_up(&mut self, settings: Settings) {
+        self.settings = settings;
+        self.longest_pause_steps = settings.longest_pause_steps();
+        self.now = Instant(settings.first_peak_ticks());
     }
 
     /// The PWM timer's interrupt, at the carrier's peak. Deadline: the next valley, where the shadow registers take over. Returns `true` if it came

@@ -33,6 +33,7 @@ pub struct Stage {
     dc_link_range_v: f64,
     encoder_counts: u64,
     encoder_zeros_deg: [f64; 2],
+    behind_line_filter: bool,
     z_source: ZSource,
 }
 
@@ -90,7 +91,8 @@ impl Host {
     pub fn new(stage: &Stage, tables: &'static Tables, zeros: &[u32]) -> Self {
         let ticks_per_s = CORE_HZ / TICK_CYCLES;
         let clock = Clock::new(ticks_per_s, ticks_per_s / CONTROL_HZ);
-        let settings = Settings::new(clock, clock.control_ticks, tables);
+        let settings = Settings::new(clock, clock.control_ticks, tables)
+            .behind_line_filter(stage.behind_line_filter, tables);
         let turns = (tables.ratings.pole_pairs as u64) << 32;
         let units_per_count = ((turns + stage.encoder_counts / 2) / stage.encoder_counts) as u32;
         let rotor = |degrees: f64| {

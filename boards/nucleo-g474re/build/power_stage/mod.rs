@@ -95,9 +95,9 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
     if min_pulse_ns.is_some() {
         return Err(stage.refuse("min_pulse_ns", "the modulator of the nine switches has none".to_owned()));
     }
-    if stage.keys.behind_line_filter.is_some() {
-        return Err(stage.refuse("behind_line_filter", "the Z-source has chokes of its own".to_owned()));
-    }
+    let Some(behind) = stage.keys.behind_line_filter else {
+        return Err(stage.refuse("behind_line_filter", "is missing".to_owned()));
+    };
     let keys = &stage.keys;
     let (counts, as_it_is) =
         ("the ZS9's board reads encoders that count", "the control of two motors takes everything as it is");
@@ -120,7 +120,7 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
         return Err(stage.refuse("z_source", "is missing".to_owned()));
     };
     stage.check_times(ZS9_DEAD_TIME_NS)?;
-    let settings = zs9_rates::settings(machine.tables);
+    let settings = zs9_rates::settings(machine.tables, behind);
     let operated = tractive::drive::dual::Settings::operator_ratings(&machine.tables.ratings);
     let capacitor_v = f64::from(settings.limits.capacitor_max_v);
     stage.check_sensors(machine, capacitor_v, "the capacitors' highest voltage", 2)?;

@@ -37,5 +37,5 @@ pub static RATINGS: Ratings = Settings::operator_ratings(&BUILT_IN.ratings);
 
 /// The settings of the drive's tasks.
 pub const fn settings() -> Settings {
-    rates::settings(&BUILT_IN)
+    rates::settings(&BUILT_IN, stage::STAGE.common.behind_line_filter)
 }

@@ -35,7 +35,7 @@ pub const HALF_CYCLES: u16 = {
     cycles as u16
 };
 
-/// The settings of the drive's tasks for two identical machines.
-pub const fn settings(tables: &Tables) -> Settings {
-    Settings::new(CLOCK, CARRIER_TICKS, tables)
+/// The settings of the drive's tasks for two identical machines, with a source behind a line filter or not.
+pub const fn settings(tables: &Tables, behind_line_filter: bool) -> Settings {
+    Settings::new(CLOCK, CARRIER_TICKS, tables).behind_line_filter(behind_line_filter, tables)
 }

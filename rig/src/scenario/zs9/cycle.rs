@@ -364,6 +364,7 @@ mod tests {
             capacitor_v: 533.5,
             inductor_a: 0.0,
             source_v: 400.0,
+            line_a: None,
             duty: 0.2,
             scheme: Scheme::Rthd,
             trip: None,

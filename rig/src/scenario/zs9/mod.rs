@@ -23,8 +23,8 @@ use crate::inject::zs9::Kind;
 use crate::law::LawName;
 use crate::machine::Machine;
 use crate::options::{On, positive};
-use crate::plant::SpeedSource;
 use crate::plant::zs9::{NetworkState, ZNetwork, Zs9Plant, Zs9Settings};
+use crate::plant::{LineFilter, SpeedSource};
 use crate::report::Page;
 use crate::run::{CLOCK, Supervisor, on_host};
 use crate::verdict::{Verdict, bound};
@@ -77,6 +77,10 @@ pub struct Zs9Options {
     /// Threshold and slope of an IGBT, and of a diode, for the nine devices and the source's switch.
     #[arg(long, value_name = "V,MOHM,V,MOHM", allow_negative_numbers = true)]
     pub device_drop: Option<Drops>,
+    /// Line filter between the source and its contactor: choke, capacitor and the resistance of both, written L_MH,C_MF,R_MOHM; without it the source is
+    /// stiff.
+    #[arg(long, value_name = "L_MH,C_MF,R_MOHM", allow_negative_numbers = true)]
+    pub line: Option<LineFilter>,
     /// Drops, dead time, steps and noise of the current converters, ripple of the source and a warm winding at once; an option that is also
     /// given keeps its own value.
     #[arg(long)]
@@ -190,7 +194,12 @@ impl System for Zs9 {
         let bench = bench(plan, options, machine)?;
         let settings = settings::drive(CLOCK, options.own.carrier_hz, machine.tables);
         let told_us = if options.own.uncompensated { 0.0 } else { options.dead_time_us };
-        let settings = settings::with_dead_time(settings, told_us * 1e-6);
+        let behind_line_filter = options.own.line.is_some_and(|filter| {
+            let power_w = 2.0 * machine.folder.parameters.max_power_w;
+            filter.needs_damping(power_w, source_v(options, machine))
+        });
+        let settings = settings::with_dead_time(settings, told_us * 1e-6)
+            .behind_line_filter(behind_line_filter, machine.tables);
         settings::check(&settings, machine)?;
         let (on, law) = options.choice()?;
         match on {
@@ -207,6 +216,7 @@ impl System for Zs9 {
             }
             On::Qemu => {
                 let setup = DualSetup {
+                    behind_line_filter,
                     carrier_ticks: settings.carrier_ticks,
                     dead_time_ticks: settings.dead_time_ticks,
                     line,
@@ -222,6 +232,7 @@ impl System for Zs9 {
     }
 
     fn draw_common(recording: &Recording, page: &mut Page) {
+        figures::line(page, recording);
         figures::recorder(page, recording);
         let tripped = recording.rows.iter().find_map(|row| Some((row.t_s, row.trip?)));
         if let Some((t_s, trip)) = tripped {
@@ -288,7 +299,7 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
         edges: plan.edges,
         dead_time_s: options.dead_time_us * 1e-6,
     };
-    let bench = Bench::new(plant, plan.operator, settings).with_line(plan.line);
+    let bench = Bench::new(plant, plan.operator, settings).with_line(plan.line).behind(options.own.line);
     Ok(if written_step_s == judged_step_s { bench } else { bench.writing_every(written_step_s) })
 }
 
@@ -312,9 +323,12 @@ pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
     [(); 2].map(|()| SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 })
 }
 
-/// Verdicts on figures: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or
-/// with a link below the machine's own, figures are only reported, because the link's are farther off there. But if nothing was injected,
-/// a figure that never came falls short of any bound.
+/// Largest swing that a source behind a line filter may have at the end of a run, in % of its voltage.
+const MOST_SWING_PERCENT: f64 = 3.0;
+
+/// Verdicts on figures: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, with a
+/// link below the machine's own, or behind a line filter, figures are only reported, because the link's are farther off there; but a filter must not
+/// swing for ever. If nothing was injected, a figure that never came falls short of any bound.
 pub fn judge(
     figures: &Figures,
     options: &Options,
@@ -322,13 +336,19 @@ pub fn judge(
     bounds: &[(&str, &str, f64)],
 ) -> Vec<Verdict> {
     let has_link = link_v(options, machine) >= machine.folder.parameters.zs9_link_v;
-    let judged = has_link && options.own.device_drop.is_none();
+    let judged = has_link && options.own.device_drop.is_none() && options.own.line.is_none();
     let verdict = |(what, name, at_most): &(&str, &str, f64)| {
         let at_most = if judged { bound(options, *at_most, f64::INFINITY) } else { f64::INFINITY };
         let verdict = Verdict::at_most(what, figures.number(name), at_most);
         if options.own.inject.is_some() { verdict } else { verdict.wanted() }
     };
-    bounds.iter().map(verdict).collect()
+    // A fault's effect and a ripple of the line make it swing.
+    let swings = options.own.inject.is_some() || options.udc_ripple.is_some() && !options.own.real;
+    let swing = figures.number(figures::SOURCE_SWING).map(|percent| {
+        let at_most = if swings { f64::INFINITY } else { MOST_SWING_PERCENT };
+        Verdict::at_most("swing of the source that is left in %", percent, at_most)
+    });
+    bounds.iter().map(verdict).chain(swing).collect()
 }
 
 /// A speed in rad/s.

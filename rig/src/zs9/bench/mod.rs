@@ -26,6 +26,7 @@ use super::trace::Row;
 use crate::bench::{Conversions, Converter, Due, Observed, Tick, Timeline};
 use crate::inject::zs9::Spoiler;
 use crate::plant::zs9::{NetworkState, Zs9Plant};
+use crate::plant::{FilteredLink, LineFilter};
 use gates::Gates;
 use spans::Spans;
 use tractive::drive::dual::COMPARE_STEPS;
@@ -47,6 +48,8 @@ pub struct Bench {
     converter: Converter,
     spoiler: Spoiler,
     nominal_source_v: f64,
+    /// A line filter between the source and its contactor; its capacitor is at the contactor, as is the source's sensor.
+    filter: Option<FilteredLink>,
     time: Timeline,
     course: Course,
     /// Beginning of the carrier period being played, and its length.
@@ -81,6 +84,7 @@ impl Bench {
         Self {
             orders: operator.orders(-settings.lead_s, speeds),
             nominal_source_v: plant.source_v,
+            filter: None,
             plant,
             operator,
             converter: Converter::new(settings.flaws),
@@ -112,6 +116,12 @@ impl Bench {
             self.line = Some(LineSide::new(times, &self.settings.drive.clock));
             self.plant.network = NetworkState::even(0.0, LineSide::EMPTY_V);
         }
+        self
+    }
+
+    /// The same behind a line filter, if there is one.
+    pub fn behind(mut self, filter: Option<LineFilter>) -> Self {
+        self.filter = filter.map(|filter| FilteredLink::new(filter, self.nominal_source_v));
         self
     }
 

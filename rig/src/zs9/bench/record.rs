@@ -64,6 +64,7 @@ impl Bench {
         let sums = self.plant.take_sums();
         let seen = Seen {
             source_v: self.plant.source_v,
+            line_a: self.filter.map(|filter| filter.choke_a),
             source_j: self.plant.energies.source_j,
             explained_j: self.plant.energies.source_j - self.plant.residual_j(0.0),
             speeds_rpm: self.speeds_rpm(),

@@ -5,12 +5,13 @@ use crate::bench::Tick;
 use crate::inject::zs9::Kind;
 use crate::plant::stopwatch::in_plant;
 use crate::plant::zs9::LegGates;
+use crate::steps::held;
 use tractive::protection::SafeState;
 
 /// The capacitor behind the source's contactor, in F: as large as the network's.
 const INPUT_F: f64 = 500e-6;
-/// Longest step of its voltage, in s.
-const LONGEST_LOST_S: f64 = 10e-6;
+/// Longest step of its voltage and of a line filter's, in s.
+const LONGEST_S: f64 = 10e-6;
 
 impl Bench {
     /// Runs to `to`, doing all that is due on the way and at `to` itself.
@@ -39,23 +40,34 @@ impl Bench {
         if to <= self.time.now {
             return Ok(());
         }
-        if self.spoiler.injected.kind(self.time.now_s()) == Some(Kind::SourceLost) {
-            let longest = (LONGEST_LOST_S / self.time.step_s).round() as Tick;
-            while self.time.now + longest < to {
-                self.integrate_lost(self.time.now + longest)?;
-            }
-            return self.integrate_lost(to);
+        let lost = self.spoiler.injected.kind(self.time.now_s()) == Some(Kind::SourceLost);
+        if !lost && self.filter.is_none() {
+            return self.integrate_fed(to);
         }
-        self.integrate_fed(to)
+        let longest = (LONGEST_S / self.time.step_s).round() as Tick;
+        while self.time.now + longest < to {
+            self.integrate_drawn(lost, self.time.now + longest)?;
+        }
+        self.integrate_drawn(lost, to)
     }
 
-    /// With the source cut off, its capacitor loses the energy that it gives.
-    fn integrate_lost(&mut self, to: Tick) -> Result<(), BenchError> {
-        let before_j = self.plant.energies.source_j;
+    /// With a line filter, or with the source cut off: its capacitor loses the energy that it gives.
+    fn integrate_drawn(&mut self, lost: bool, to: Tick) -> Result<(), BenchError> {
+        let (before_j, begun) = (self.plant.energies.source_j, self.time.now);
         self.integrate_fed(to)?;
         let given_j = self.plant.energies.source_j - before_j;
-        let square = self.plant.source_v.powi(2) - 2.0 * given_j / INPUT_F;
-        self.plant.source_v = square.max(1.0).sqrt();
+        let dt_s = (to - begun) as f64 * self.time.step_s;
+        let line_v = (!lost).then(|| self.line_v());
+        match &mut self.filter {
+            Some(filter) => {
+                filter.advance(given_j, dt_s, line_v);
+                self.plant.source_v = filter.udc_v;
+            }
+            None => {
+                let square = self.plant.source_v.powi(2) - 2.0 * given_j / INPUT_F;
+                self.plant.source_v = square.max(1.0).sqrt();
+            }
+        }
         Ok(())
     }
 
@@ -138,10 +150,18 @@ impl Bench {
     /// The source's voltage at its contactor, with the fault's effect, in V.
     pub(super) fn behind_contactor_v(&self) -> f64 {
         let t_s = self.time.now_s();
-        match self.spoiler.injected.kind(t_s) {
-            Some(Kind::SourceLost) => self.plant.source_v,
-            _ => self.spoiler.source_v(t_s, self.nominal_source_v),
+        match (&self.filter, self.spoiler.injected.kind(t_s)) {
+            (Some(filter), _) => filter.udc_v,
+            (None, Some(Kind::SourceLost)) => self.plant.source_v,
+            (None, _) => self.spoiler.source_v(t_s, self.nominal_source_v),
         }
+    }
+
+    /// Voltage of the line in front of a line filter, with its course, its ripple and the fault's effect, in V.
+    pub(super) fn line_v(&self) -> f64 {
+        let t_s = self.time.now_s();
+        let healthy_v = held(&self.course.source_v, t_s).unwrap_or(self.nominal_source_v);
+        self.spoiler.source_v(t_s, healthy_v + self.converter.ripple_v(t_s))
     }
 
     /// Phase currents of both motors, in A.

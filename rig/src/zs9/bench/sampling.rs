@@ -74,13 +74,11 @@ impl Bench {
             self.orders.loads_nm = loads_nm;
         }
         self.set_loads_nm(self.orders.loads_nm);
-        let healthy_v = held(&self.course.source_v, t_s).unwrap_or(self.nominal_source_v);
-        let supply_v = healthy_v + self.converter.ripple_v(t_s);
         // If the source is cut off, its voltage is its capacitor's.
-        let source_v = if self.spoiler.injected.kind(t_s) == Some(Kind::SourceLost) {
-            self.plant.source_v
-        } else {
-            self.spoiler.source_v(t_s, supply_v)
+        let source_v = match &self.filter {
+            Some(filter) => filter.udc_v,
+            None if self.spoiler.injected.kind(t_s) == Some(Kind::SourceLost) => self.plant.source_v,
+            None => self.line_v(),
         };
         let hardware = self.spoiler.hardware(t_s);
         match &mut self.line {

@@ -18,6 +18,7 @@ struct Sums {
 /// The plant at the instant at which a row ends, and control's report until then.
 pub struct Seen {
     pub source_v: f64,
+    pub line_a: Option<f64>,
     pub source_j: f64,
     pub explained_j: f64,
     pub speeds_rpm: [f64; 2],
@@ -112,6 +113,7 @@ impl Spans {
             capacitor_v: means.capacitor_v,
             inductor_a: means.inductor_a,
             source_v: sums.source_v / sums.steps,
+            line_a: seen.line_a,
             duty: sums.shorted / sums.steps,
             scheme: seen.report.scheme,
             trip: seen.report.trip,
