@@ -484,6 +484,8 @@ fn messages_arrive_as_they_were_sent() {
         source_v: 400.0,
         speed_known: true,
         acknowledged: 9,
+        angle_zeros: [Angle(0x8000_0001), Angle(0x7FFF_FFFF)],
+        calibrating: [false, true],
     };
     assert_eq!(DualReport::from_words(report.to_words()), report);
 }

@@ -239,6 +239,7 @@ fn both_motors_over_the_protocol_are_the_same() {
 #[ignore = "needs the image and QEMU"]
 fn a_zero_is_calibrated_the_same() {
     same_talk("pmasynrm", "calibrate.talk", &["--angle-error", "8"]);
+    same_talk("zs9", "zs9-calibrate.talk", &["--angle-error", "8"]);
 }
 
 /// The same experiment: the same machine folder, and over the protocol the same frames.

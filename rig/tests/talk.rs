@@ -81,6 +81,28 @@ fn the_zero_of_the_angle_is_calibrated_either_way() {
     }
 }
 
+/// The ZS9's two zeros at once, one motor turning backward; with the papers' ordinary law, which looks for no unexplained voltage, none is found, and the drive does
+/// not say that it is being found.
+#[test]
+fn both_zeros_of_the_zs9_are_calibrated() {
+    let text = std::fs::read_to_string(script("zs9-calibrate.talk")).unwrap();
+    for (error, law, found, calibrates) in
+        [("8", "tractive", "-8", "1"), ("-8", "tractive", "8", "1"), ("8", "pi", "0", "0")]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let (script_of, out) = (folder.path().join("zero.talk"), folder.path().join("out"));
+        let changed = ["1", "2"].iter().fold(text.clone(), |text, motor| {
+            text.replace(&format!("angle_zero{motor}_deg -8"), &format!("angle_zero{motor}_deg {found}"))
+                .replace(&format!("calibrating{motor} 1"), &format!("calibrating{motor} {calibrates}"))
+        });
+        std::fs::write(&script_of, changed).unwrap();
+        let mut talk = rig();
+        talk.args(["--system", "zs9"]).arg(&script_of).args(["--angle-error", error, "--law", law, "--out"]);
+        let output = talk.arg(&out).output().unwrap();
+        assert!(output.status.success(), "{error} {law}: {}", String::from_utf8_lossy(&output.stdout));
+    }
+}
+
 /// Noise of the current sensors shows before anything flows.
 #[test]
 fn the_flaws_of_real_are_in_a_talk_too() {

@@ -10,7 +10,7 @@ use crate::time::{Clock, Instant};
 /// Between the PMaSynRM drive's operator and its control interrupt.
 pub type OperatorMailboxes = Mailboxes<DriveCommand, Report, 7, 15>;
 /// Between the ZS9's operator and its control interrupt.
-pub type DualOperatorMailboxes = Mailboxes<DualDriveCommand, DualReport, 7, 17>;
+pub type DualOperatorMailboxes = Mailboxes<DualDriveCommand, DualReport, 7, 19>;
 
 /// The drive's observation of itself: the report of the control interrupt that began a slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,7 +71,7 @@ impl Words<7> for Timed<DriveCommand> {
 
 impl Words<7> for Timed<DualDriveCommand> {
     fn to_words(self) -> [u32; 7] {
-        let DualDriveCommand { enable, demands, speed_torque_nm, link_ref_v, scheme, acknowledge } =
+        let DualDriveCommand { enable, demands, speed_torque_nm, link_ref_v, scheme, acknowledge, calibrate } =
             self.command;
         let word = |demand| match demand {
             MotorDemand::Torque(Demand { torque_nm, .. }) => (0, torque_nm.to_bits()),
@@ -80,7 +80,7 @@ impl Words<7> for Timed<DualDriveCommand> {
         let [(kind1, d1), (kind2, d2)] = demands.map(word);
         let [l1, l2] = speed_torque_nm.map(f32::to_bits);
         let flags = u32::from(enable) | kind1 << 1 | kind2 << 2 | u32::from(acknowledge) << 8;
-        let flags = flags | (scheme as u32) << 16;
+        let flags = flags | u32::from(calibrate) << 3 | (scheme as u32) << 16;
         [self.from.0, flags, d1, d2, l1, l2, link_ref_v.to_bits()]
     }
 
@@ -98,6 +98,7 @@ impl Words<7> for Timed<DualDriveCommand> {
                 link_ref_v: f32::from_bits(link_ref),
                 scheme: Scheme::from_code(flags >> 16),
                 acknowledge: (flags >> 8) as u8,
+                calibrate: flags & 8 != 0,
             },
             from: Instant(from),
         }
@@ -118,16 +119,16 @@ impl Words<15> for Observation<Report> {
     }
 }
 
-impl Words<17> for Observation<DualReport> {
+impl Words<19> for Observation<DualReport> {
     #[inline]
-    fn to_words(self) -> [u32; 17] {
-        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = self.report.to_words();
-        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p]
+    fn to_words(self) -> [u32; 19] {
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r] = self.report.to_words();
+        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r]
     }
 
-    fn from_words(words: [u32; 17]) -> Self {
-        let [at, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = words;
-        let report = DualReport::from_words([a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p]);
+    fn from_words(words: [u32; 19]) -> Self {
+        let [at, report @ ..] = words;
+        let report = DualReport::from_words(report);
         Self { at: Instant(at), report }
     }
 }
@@ -182,6 +183,9 @@ where
         self.command.publish(Timed { command, from });
     }
 }
+
+/// Time between two reports to the operator, in s.
+pub(super) const SLOT_S: f32 = 1e-3;
 
 /// The control interrupt's counter of the periods in a slot, the operator's step: a millisecond.
 #[derive(Clone, Copy, Debug)]
@@ -280,7 +284,7 @@ mod tests {
             true => MotorDemand::Speed(value),
             false => MotorDemand::Torque(Demand { torque_nm: value, slew_limited: true }),
         };
-        for [enable, first, second, a, b, ..] in flags() {
+        for [enable, first, second, a, b, calibrate, ..] in flags() {
             for scheme in (0..8).map(Scheme::from_code) {
                 let command = DualDriveCommand {
                     enable,
@@ -289,6 +293,7 @@ mod tests {
                     link_ref_v: 5.0,
                     scheme,
                     acknowledge: u8::from(a) | u8::from(b) << 7,
+                    calibrate,
                 };
                 let timed = Timed { command, from: INSTANT };
                 assert_eq!(Timed::<DualDriveCommand>::from_words(timed.to_words()), timed);
@@ -337,6 +342,8 @@ mod tests {
                     source_v: 12.0,
                     speed_known,
                     acknowledged,
+                    angle_zeros: [Angle(0x8123_4567), Angle(0x0000_FFFF)],
+                    calibrating: [calibrating, first],
                 };
                 let observed = Observation { at: INSTANT, report };
                 assert_eq!(Observation::<DualReport>::from_words(observed.to_words()), observed);

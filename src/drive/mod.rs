@@ -10,8 +10,8 @@ pub mod traction;
 
 use crate::ports::System;
 
-use mailbox::SlotTimer;
 pub use mailbox::{DualOperatorMailboxes, Mailboxes, Observation, OperatorMailboxes, Timed};
+use mailbox::{SLOT_S, SlotTimer};
 pub(crate) use mailbox::{next_slot, slots_between};
 pub use messages::{
     Gates, LOADED_WORDS, Loaded, LoadedRecord, PLANNED_WORDS, PlannedHalf, PlannedRecord, half_from_words,

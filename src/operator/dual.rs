@@ -264,7 +264,7 @@ impl Demands for DualDemands {
     }
 
     fn command(&self, orders: &Orders, settings: &Settings) -> DualDriveCommand {
-        let Orders { enable, acknowledge, .. } = *orders;
+        let Orders { enable, acknowledge, calibrate } = *orders;
         let smaller = |limits: MotorLimits| {
             if limits.motoring_nm < limits.braking_nm { limits.motoring_nm } else { limits.braking_nm }
         };
@@ -275,6 +275,7 @@ impl Demands for DualDemands {
             link_ref_v: self.resting_v.unwrap_or(self.link_ref_v),
             scheme: DualDriveCommand::NONE.scheme,
             acknowledge,
+            calibrate,
         }
     }
 }

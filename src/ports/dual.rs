@@ -62,6 +62,8 @@ pub struct DualDriveCommand {
     pub scheme: Scheme,
     /// Number of the operator's last acknowledge.
     pub acknowledge: u8,
+    /// The zeros of both position sensors are to be calibrated, each as long as no torque is demanded of its motor.
+    pub calibrate: bool,
 }
 
 impl DualDriveCommand {
@@ -73,6 +75,7 @@ impl DualDriveCommand {
         link_ref_v: 0.0,
         scheme: Scheme::Rthd,
         acknowledge: 0,
+        calibrate: false,
     };
 
     /// The torques, in N·m, of speed demands that nobody limits.

@@ -128,6 +128,10 @@ pub struct DualReport {
     pub speed_known: bool,
     /// Number of the acknowledge that both interrupts have carried out.
     pub acknowledged: u8,
+    /// Corrections of the position sensors' zeros, electrical: the drive adds each to its sensor's angle.
+    pub angle_zeros: [Angle; 2],
+    /// Flags of those that are just being found.
+    pub calibrating: [bool; 2],
 }
 
 impl DualReport {
@@ -145,10 +149,11 @@ impl DualReport {
 const SPEED_KNOWN: u32 = 1 << 24;
 const WEAKENING: [u32; 2] = [1 << 25, 1 << 26];
 const SCHEME: u32 = 27;
+const CALIBRATING: [u32; 2] = [1 << 30, 1 << 31];
 
-impl Words<16> for DualReport {
+impl Words<18> for DualReport {
     #[inline]
-    fn to_words(self) -> [u32; 16] {
+    fn to_words(self) -> [u32; 18] {
         let [t1, t2] = self.torque_nm.map(f32::to_bits);
         let [v1, v2] = self.voltage_v.map(f32::to_bits);
         let [w1, w2] = self.omega.map(f32::to_bits);
@@ -156,19 +161,26 @@ impl Words<16> for DualReport {
         let [code, value, limit, at] = trip_to_words(self.trip);
         let flag = |set: bool, bit: u32| if set { bit } else { 0 };
         let ([weak1, weak2], [first, second]) = (self.weakening, WEAKENING);
+        let ([calibrates1, calibrates2], [third, fourth]) = (self.calibrating, CALIBRATING);
         let code = code
             | u32::from(self.acknowledged) << 16
             | flag(self.speed_known, SPEED_KNOWN)
             | flag(weak1, first)
             | flag(weak2, second)
+            | flag(calibrates1, third)
+            | flag(calibrates2, fourth)
             | (self.scheme as u32) << SCHEME;
         let [duty, inductor, capacitor, source] =
             [self.duty, self.inductor_ref_a, self.capacitor_v, self.source_v].map(f32::to_bits);
-        [t1, t2, v1, v2, duty, inductor, code, value, limit, at, w1, w2, i1, i2, capacitor, source]
+        let [zero1, zero2] = self.angle_zeros.map(|Angle(angle)| angle);
+        [
+            t1, t2, v1, v2, duty, inductor, code, value, limit, at, w1, w2, i1, i2, capacitor, source, zero1,
+            zero2,
+        ]
     }
 
-    fn from_words(words: [u32; 16]) -> Self {
-        let [t1, t2, v1, v2, duty, inductor, code, value, limit, at, measured @ ..] = words;
+    fn from_words(words: [u32; 18]) -> Self {
+        let [t1, t2, v1, v2, duty, inductor, code, value, limit, at, measured @ .., zero1, zero2] = words;
         let [w1, w2, i1, i2, capacitor_v, source_v] = measured.map(f32::from_bits);
         Self {
             torque_nm: [t1, t2].map(f32::from_bits),
@@ -184,6 +196,8 @@ impl Words<16> for DualReport {
             source_v,
             speed_known: code & SPEED_KNOWN != 0,
             acknowledged: (code >> 16) as u8,
+            angle_zeros: [zero1, zero2].map(Angle),
+            calibrating: CALIBRATING.map(|bit| code & bit != 0),
         }
     }
 }

@@ -24,9 +24,11 @@ pub trait MessageSet: Copy + 'static {
 
     /// The messages to it: the command first.
     const TO_DRIVE: &'static [&'static Message];
-    /// The messages from it: status, three of measurements, the fault's value and limit, counters, the answer about a parameter; and, for a drive
-    /// that has them, a fourth of measurements, the temperatures, and a fifth of measurements.
+    /// The messages from it: status, three of measurements, the fault's value and limit, counters, the answer about a parameter; for a drive
+    /// that has them, a fourth of measurements and the temperatures; and that of the angle's zero.
     const FROM_DRIVE: &'static [&'static Message];
+    /// The place of the last one.
+    const ANGLE_ZERO: usize = Self::FROM_DRIVE.len() - 1;
     /// The first frame of a message, or the first after a silence: it only sets the counter.
     const GREETING: Self::Content;
     /// `true` for the ZS9, whose ratings are its operator's.

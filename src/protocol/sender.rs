@@ -21,8 +21,6 @@ const ANSWER: usize = 7;
 const MORE: usize = 8;
 /// The temperatures, if a drive has them.
 const TEMPERATURES: usize = 9;
-/// A fifth message of measurements, if a drive has one.
-const ANGLE_ZERO: usize = 10;
 
 /// Counters of all messages, and the place in the cycle.
 #[derive(Clone, Copy, Debug)]
@@ -67,7 +65,7 @@ impl<D: MessageSet> Sender<D> {
             (2, _) => (1, D::measured(measured, 0, scales)),
             (4, _) => (2, D::measured(measured, 1, scales)),
             (6, _) => (3, D::measured(measured, 2, scales)),
-            (7, _) if D::FROM_DRIVE.len() > MORE => (MORE, D::measured(measured, 3, scales)),
+            (7, _) if D::ANGLE_ZERO != MORE => (MORE, D::measured(measured, 3, scales)),
             (8, 0) => {
                 let content = counts.encode(self.page);
                 self.page = Counts::page_after(self.page);
@@ -76,7 +74,7 @@ impl<D: MessageSet> Sender<D> {
             (8, 1) if D::FROM_DRIVE.len() > TEMPERATURES => {
                 (TEMPERATURES, TemperaturesFrame::from(temperatures?).encode())
             }
-            (8, 2) => (ANGLE_ZERO, D::measured(measured, 4, scales)),
+            (8, 2) => (D::ANGLE_ZERO, D::measured(measured, 4, scales)),
             (8, 3) => {
                 let [value, _] = trip_frames(trip?);
                 (FAULT_VALUE, value)

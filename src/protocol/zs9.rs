@@ -22,6 +22,8 @@ use crate::operator::{DualDemands, DualRequest, Levels, MotorRequest, Wanted};
 use crate::ports::DualReport;
 use crate::thermal::Temperatures;
 
+/// [`COMMAND`](super::COMMAND)'s, in a message of its own: [`ZS9_COMMAND`] is full.
+const CALIBRATE: Signal = Signal::flag("calibrate", 12);
 const KIND: Signal = Signal::number("page", 35, 1, 1);
 const TORQUES: [Signal; 2] = [
     Signal::physical("torque1_nm", "N.m", 16, 0.1, TORQUE_NM).of(Quantity::Torque).on_page(0),
@@ -40,6 +42,11 @@ const CURRENT: Signal = Signal::physical("current_a", "A", 48, 0.1, [0.0, 3_000.
 const LINK: Signal = Signal::physical("link_v", "V", 16, 0.1, LINK_V).of(Quantity::Voltage);
 const CAPACITOR: Signal = Signal::physical("capacitor_v", "V", 32, 0.1, LINK_V).of(Quantity::Voltage);
 const DUTY: Signal = Signal::physical("duty_percent", "%", 48, 0.01, [0.0, 100.0]);
+const ZEROS: [Signal; 2] = [
+    Signal::physical("angle_zero1_deg", "deg", 16, 0.01, [-180.0, 180.0]),
+    Signal::physical("angle_zero2_deg", "deg", 32, 0.01, [-180.0, 180.0]),
+];
+const CALIBRATING: [Signal; 2] = [Signal::flag("calibrating1", 48), Signal::flag("calibrating2", 49)];
 
 /// Levels and demands: torques on page 0, speeds on page 1. Without this message the drive does nothing.
 pub const ZS9_COMMAND: Message = Message::new(
@@ -73,6 +80,8 @@ pub const ZS9_LIMITS: [Message; 2] = [
 /// The link's voltage outside shoot-through; the nominal one until this message comes.
 pub const ZS9_LINK: Message =
     Message::new("ZS9_LINK", 0x114, 20, 100, &[LINK_REF]).telling(12, &[Quantity::Voltage]);
+/// The zeros of both position sensors are to be calibrated; not, until it comes.
+pub const ZS9_CALIBRATION: Message = Message::new("ZS9_CALIBRATION", 0x116, 31, 100, &[CALIBRATE]);
 /// Reads or writes a parameter.
 pub const ZS9_PARAMETER_REQUEST: Message =
     Message::new("ZS9_PARAMETER_REQUEST", 0x115, 21, 0, &[WRITE, PARAMETER, VALUE]);
@@ -93,6 +102,9 @@ const MOTOR_2: Message =
     Message::new("ZS9_MOTOR_2", 0x193, 24, 10, &[SPEED, TORQUE, CURRENT]).telling(12, &[Quantity::Current]);
 const LINK_STATE: Message =
     Message::new("ZS9_LINK_STATE", 0x194, 25, 10, &[LINK, CAPACITOR, DUTY]).telling(12, &[Quantity::Voltage]);
+/// Corrections of both position sensors' zeros.
+const ANGLE_ZEROS: Message =
+    Message::new("ZS9_ANGLE_ZEROS", 0x199, 0, 100, &[ZEROS[0], ZEROS[1], CALIBRATING[0], CALIBRATING[1]]);
 const FAULT_VALUE: Message = Message::new("ZS9_FAULT_VALUE", 0x195, 26, 100, &[TRIP_FAULT, TRIP_VALUE]);
 const FAULT_LIMIT: Message = Message::new("ZS9_FAULT_LIMIT", 0x196, 27, 100, &[TRIP_FAULT, TRIP_LIMIT]);
 const COUNTERS: Message = Message::new("ZS9_COUNTERS", 0x197, 28, 100, &COUNTER_SIGNALS);
@@ -100,12 +112,21 @@ const PARAMETER_ANSWER: Message =
     Message::new("ZS9_PARAMETER_ANSWER", 0x198, 29, 0, &[ANSWER_RESULT, ANSWER_PARAMETER, ANSWER_VALUE]);
 
 /// The messages to the ZS9.
-pub const TO_ZS9: [&Message; 5] =
-    [&ZS9_COMMAND, &ZS9_LIMITS[0], &ZS9_LIMITS[1], &ZS9_LINK, &ZS9_PARAMETER_REQUEST];
+pub const TO_ZS9: [&Message; 6] =
+    [&ZS9_COMMAND, &ZS9_LIMITS[0], &ZS9_LIMITS[1], &ZS9_LINK, &ZS9_PARAMETER_REQUEST, &ZS9_CALIBRATION];
 
 /// The messages from the ZS9.
-pub const FROM_ZS9: [&Message; 8] =
-    [&ZS9_STATUS, &MOTOR_1, &MOTOR_2, &LINK_STATE, &FAULT_VALUE, &FAULT_LIMIT, &COUNTERS, &PARAMETER_ANSWER];
+pub const FROM_ZS9: [&Message; 9] = [
+    &ZS9_STATUS,
+    &MOTOR_1,
+    &MOTOR_2,
+    &LINK_STATE,
+    &FAULT_VALUE,
+    &FAULT_LIMIT,
+    &COUNTERS,
+    &PARAMETER_ANSWER,
+    &ANGLE_ZEROS,
+];
 
 /// Demands of the upper motor and of the lower one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -179,6 +200,28 @@ impl Zs9Link {
     }
 }
 
+/// Content of [`ZS9_CALIBRATION`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Zs9Calibration {
+    /// The zeros of both position sensors are to be calibrated.
+    pub calibrate: bool,
+}
+
+impl Zs9Calibration {
+    /// As a frame's content.
+    pub fn encode(&self) -> Payload {
+        let mut payload = Payload::default();
+        CALIBRATE.put_raw(&mut payload, self.calibrate.into());
+        payload
+    }
+
+    /// From a frame's content; `None` if an unused bit is set.
+    pub fn decode(payload: Payload) -> Option<Self> {
+        ZS9_CALIBRATION.is_tidy(payload).then(|| Self { calibrate: CALIBRATE.is_set(payload) })
+    }
+}
+
 /// The content of an accepted frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -193,6 +236,8 @@ pub enum Zs9Content {
     Link(Zs9Link),
     /// A parameter is to be read or written.
     Parameter(ParameterRequest),
+    /// The zeros are to be calibrated, or not.
+    Calibration(Zs9Calibration),
 }
 
 /// The measurements of one motor. `None`: not available.
@@ -219,10 +264,26 @@ pub struct Zs9Measured {
     pub capacitor_v: Option<f32>,
     /// Shoot-through duty, in percent.
     pub duty_percent: Option<f32>,
+    /// Corrections of the position sensors' zeros, electrical, in degrees: the drive adds each to its sensor's angle.
+    pub angle_zeros_deg: [Option<f32>; 2],
+    /// Flags of those that are just being found.
+    pub calibrating: [bool; 2],
 }
 
 impl Zs9Measured {
-    /// Adopts the content of one of the three messages.
+    /// Content of the message of the zeros.
+    fn angle_zeros(&self) -> Payload {
+        let mut payload = Payload::default();
+        for (signal, degrees) in ZEROS.iter().zip(self.angle_zeros_deg) {
+            signal.put_measured(&mut payload, degrees);
+        }
+        for (signal, calibrating) in CALIBRATING.iter().zip(self.calibrating) {
+            signal.put_raw(&mut payload, calibrating.into());
+        }
+        payload
+    }
+
+    /// Adopts the content of one of the four messages.
     pub fn merge(&mut self, message: &Message, payload: Payload, scales: Scales) {
         let [first, second] = &mut self.motors;
         let motor = match message.id {
@@ -232,6 +293,11 @@ impl Zs9Measured {
                 self.link_v = LINK.get_on(scales, payload);
                 self.capacitor_v = CAPACITOR.get_on(scales, payload);
                 self.duty_percent = DUTY.get_on(scales, payload);
+                return;
+            }
+            id if id == ANGLE_ZEROS.id => {
+                self.angle_zeros_deg = ZEROS.each_ref().map(|zero| zero.get(payload));
+                self.calibrating = CALIBRATING.each_ref().map(|flag| flag.is_set(payload));
                 return;
             }
             _ => return,
@@ -248,6 +314,7 @@ pub struct Zs9 {
     command: Zs9Command,
     limits: [Option<TorqueLimits>; 2],
     link: Option<Zs9Link>,
+    calibrate: bool,
 }
 
 impl MessageSet for Zs9 {
@@ -260,7 +327,8 @@ impl MessageSet for Zs9 {
     const FROM_DRIVE: &'static [&'static Message] = &FROM_ZS9;
     const IS_ZS9: bool = true;
     const GREETING: Zs9Content = Zs9Content::Greeting;
-    const SILENT: Self = Self { command: Zs9Command::AT_REST, limits: [None; 2], link: None };
+    const SILENT: Self =
+        Self { command: Zs9Command::AT_REST, limits: [None; 2], link: None, calibrate: false };
 
     fn decode(id: u16, payload: Payload, scales: Scales) -> Option<Zs9Content> {
         let [first, second] = &ZS9_LIMITS;
@@ -270,6 +338,7 @@ impl MessageSet for Zs9 {
             id if id == second.id => Zs9Content::Limits(1, TorqueLimits::decode(payload, scales)?),
             id if id == ZS9_LINK.id => Zs9Content::Link(Zs9Link::decode(payload, scales)?),
             id if id == ZS9_PARAMETER_REQUEST.id => Zs9Content::Parameter(ParameterRequest::decode(payload)?),
+            id if id == ZS9_CALIBRATION.id => Zs9Content::Calibration(Zs9Calibration::decode(payload)?),
             _ => return None,
         })
     }
@@ -288,13 +357,14 @@ impl MessageSet for Zs9 {
                 }
             }
             Zs9Content::Link(link) => self.link = Some(link),
+            Zs9Content::Calibration(calibration) => self.calibrate = calibration.calibrate,
             Zs9Content::Parameter(request) => return Taken::Parameter(request),
         }
         Taken::Kept
     }
 
     fn rest(&mut self) {
-        self.command = Zs9Command::AT_REST;
+        (self.command, self.calibrate) = (Zs9Command::AT_REST, false);
     }
 
     /// Once the command is old, a speed demand becomes zero torque.
@@ -311,8 +381,9 @@ impl MessageSet for Zs9 {
             limits: motor_limits(sent.as_ref(), parameters, ratings),
         };
         let [_, _, nominal_v] = dual::Settings::link_range_v(ratings);
+        let levels = if armed { levels } else { Levels { off: levels.off, ..Zs9Command::AT_REST.levels } };
         DualRequest {
-            levels: if armed { levels } else { Levels { off: levels.off, ..Zs9Command::AT_REST.levels } },
+            levels: Levels { calibrate: armed && fresh && self.calibrate, ..levels },
             motors: [motor(first, limits1), motor(second, limits2)],
             link_ref_v: self.link.map_or(nominal_v, |link| link.link_ref_v),
         }
@@ -337,6 +408,8 @@ impl MessageSet for Zs9 {
             link_v: Some(report.link_v()),
             capacitor_v: Some(report.capacitor_v),
             duty_percent: Some(100.0 * report.duty),
+            angle_zeros_deg: report.angle_zeros.map(|zero| Some(zero.signed_radians().to_degrees())),
+            calibrating: report.calibrating,
         };
         (measured, report.scheme)
     }
@@ -346,6 +419,7 @@ impl MessageSet for Zs9 {
         let motor = match message {
             0 => first,
             1 => second,
+            4 => return measured.angle_zeros(),
             _ => {
                 let link = [
                     (&LINK, measured.link_v),

@@ -90,7 +90,7 @@ impl DualRequest {
             2 => Self::ControlSample(at),
             3 => {
                 let [a, b, c, d, e, f, g, h, i, j, ..] = payload;
-                let report = [a, b, c, d, e, f, g, h, i, j, 0, 0, 0, 0, 0, 0];
+                let report = [a, b, c, d, e, f, g, h, i, j, 0, 0, 0, 0, 0, 0, 0, 0];
                 Self::ControlReport(at, DualReport::from_words(report))
             }
             4 => Self::PowerSample(at),
@@ -211,6 +211,7 @@ pub fn dual_command_from_words([demand1, demand2, link, flags]: [u32; 4]) -> Dua
         link_ref_v: f32::from_bits(link),
         scheme: Scheme::from_code(flags >> 8 & 0xFF),
         acknowledge: 0,
+        calibrate: false,
     }
 }
 
@@ -281,6 +282,7 @@ mod tests {
             scheme: Scheme::Zvo,
             speed_torque_nm: DualDriveCommand::UNLIMITED_NM,
             acknowledge: 0,
+            calibrate: false,
         }
     }
 

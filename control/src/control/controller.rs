@@ -158,8 +158,8 @@ impl<const RIPPLE: bool> ControlLaw for Controller<RIPPLE> {
         self.map_error.share()
     }
 
-    fn unexplained_v(&self) -> Dq {
-        self.disturbance.latest()
+    fn unexplained_v(&self) -> Option<Dq> {
+        Some(self.disturbance.latest())
     }
 
     fn passed_s(&self, clock: &Clock) -> f32 {

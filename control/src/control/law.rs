@@ -87,10 +87,10 @@ pub trait ControlLaw {
         0.0
     }
 
-    /// Voltage that the law leaves unexplained, in V, rotor frame: the difference from what currents, angle and map imply; zero for a law
+    /// Voltage that the law leaves unexplained, in V, rotor frame: the difference from what currents, angle and map imply; `None` for a law
     /// that does not look.
-    fn unexplained_v(&self) -> Dq {
-        Dq { d: 0.0, q: 0.0 }
+    fn unexplained_v(&self) -> Option<Dq> {
+        None
     }
 
     /// Time since the last operating point, in s.

@@ -225,9 +225,8 @@ impl ZSource {
         let ratio = led_v * per_source;
 
         // Outer loop. While the reference moves, the capacitors' charging current is known beforehand.
-        let before = if self.link_ref_v.is_some() { self.damper } else { SourceDamper::at(source_v) };
-        let capacitors = (design.capacitance_f, at_least(capacitor_v, source_v));
-        let (damper, moving) = before.step(source_v, capacitors, design.damping_s, design.period_s);
+        let damped = (design.damping_s > 0.0).then(|| self.damped(input, design));
+        let (damper, moving) = damped.unwrap_or((SourceDamper::at(0.0), 0.0));
         let error_v = 0.5 * (led_v + source_v) + damper.moved_v - capacitor_v;
         let moving_v_s = 0.5 * (led_v - at_least(from_v, source_v)) / design.period_s + moving;
         let charging_a = design.capacitance_f * moving_v_s;
@@ -261,6 +260,16 @@ impl ZSource {
         self.damper = damper;
         (self.link_ref_v, self.integral_a) = (Some(led_v), integral_a);
         Ok(ZSourceOutput { duty, link_v, link_ref_v: led_v, inductor_ref_a, limited })
+    }
+
+    /// The damping of the source's swing after a period, and the slope of its shift. Out of line: most sources are stiff.
+    #[cold]
+    #[inline(never)]
+    fn damped(&self, input: &ZSourceInput, design: &ZSourceDesign) -> (SourceDamper, f32) {
+        let ZSourceInput { capacitor_v, source_v, .. } = *input;
+        let before = if self.link_ref_v.is_some() { self.damper } else { SourceDamper::at(source_v) };
+        let capacitors = (design.capacitance_f, at_least(capacitor_v, source_v));
+        before.step(source_v, capacitors, design.damping_s, design.period_s)
     }
 }
 

@@ -189,7 +189,8 @@ impl Listener {
                 Some(measured.calibrating.into()),
             ],
             System::Zs9 => {
-                let [first, second] = &self.zs9.motors;
+                let ([first, second], [zero1, zero2]) = (&self.zs9.motors, self.zs9.angle_zeros_deg);
+                let [calibrates1, calibrates2] = self.zs9.calibrating.map(|flag| Some(flag.into()));
                 vec![
                     first.speed_rpm,
                     first.torque_nm,
@@ -200,6 +201,10 @@ impl Listener {
                     self.zs9.link_v,
                     self.zs9.capacitor_v,
                     self.zs9.duty_percent,
+                    zero1,
+                    zero2,
+                    calibrates1,
+                    calibrates2,
                 ]
             }
         }

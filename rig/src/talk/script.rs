@@ -246,9 +246,6 @@ fn action(name: &str, words: &mut Words, system: System) -> Result<Action> {
         Some(_) if system == System::Zs9 && name == "link-limits" => {
             bail!("link-limits: the ZS9 has none; `link` is its voltage")
         }
-        Some(_) if system == System::Zs9 && name == "calibrate" => {
-            bail!("calibrate: the ZS9 has no such command; its zeros are keys of the power stage")
-        }
         Some((_, read)) => read(words),
         None => bail!("{name}: must be one of: {}", COMMANDS.map(|(usage, _)| usage).join(", ")),
     }

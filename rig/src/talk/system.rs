@@ -45,6 +45,6 @@ const STATUS: &str =
 const MEASURED: &str = "speed_rpm torque_nm link_v current_a id_ref_a iq_ref_a voltage_v frequency_hz temperature_c \
     torque_estimate_nm angle_zero_deg calibrating";
 const ZS9_MEASURED: &str = "speed1_rpm torque1_nm current1_a speed2_rpm torque2_nm current2_a \
-    link_v capacitor_v duty_percent";
+    link_v capacitor_v duty_percent angle_zero1_deg angle_zero2_deg calibrating1 calibrating2";
 const COUNTS: &str = "received taken lost unknown truncated corrupted repeated disordered out_of_range \
     parameter parameter_value parameter_result telemetry_errors";

@@ -2,9 +2,10 @@
 
 use super::{MotorCommand, MotorShare, Settings, TURNS};
 use crate::control::{
-    AimInput, Boundary, Committed, ControlLaw, DeadTime, Demand, Law, Measurements, ModeLimits, Region,
-    RotorSample, SpeedInput, SpeedLoop,
+    AimInput, AngleZero, Boundary, Committed, ControlLaw, DeadTime, Demand, Law, Measurements, ModeLimits,
+    Region, RotorSample, SpeedInput, SpeedLoop, WithoutTorque,
 };
+use crate::drive::SLOT_S;
 use crate::frames::{AlphaBeta, Angle};
 use crate::machine::Tables;
 use crate::ports::MotorDemand;
@@ -40,6 +41,9 @@ pub struct Axis<L> {
     speed_loop: SpeedLoop,
     watch: FrozenWatch,
     unexplained: UnexplainedWatch,
+    /// Correction that is added to the sensor's angle, and whether it is just being found.
+    pub zero: AngleZero,
+    pub calibrating: bool,
     /// Filtered electrical speed, in rad/s.
     slow: f32,
     /// Mean voltage of the period that began at the last sample, per volt of link, and the link's voltage at that sample.
@@ -90,6 +94,8 @@ impl<L: ControlLaw> Axis<L> {
             speed_loop: SpeedLoop::new(),
             watch: FrozenWatch::new(),
             unexplained: UnexplainedWatch::new(),
+            zero: AngleZero::NONE,
+            calibrating: false,
             slow: 0.0,
             acting: None,
             ended: None,
@@ -212,8 +218,15 @@ impl<L: ControlLaw> Axis<L> {
             };
             self.controller.learn(&boundary, &sample, limits.follows, &law);
             let DeadTime { voltage_v, left_share, .. } = dead_time(input.link_v, settings);
-            let unexplained_v = self.controller.unexplained_v();
-            self.unexplained.step(unexplained_v, left_share * voltage_v, omega, boundary.length_s, tables);
+            if let Some(unexplained_v) = self.controller.unexplained_v() {
+                self.unexplained.step(
+                    unexplained_v,
+                    left_share * voltage_v,
+                    omega,
+                    boundary.length_s,
+                    tables,
+                );
+            }
         }
         let voltage = self.controller.regulate(&sample, &committed, &limits, &law);
         let target = self.controller.target();
@@ -226,6 +239,22 @@ impl<L: ControlLaw> Axis<L> {
         // Power of the voltage that begins to act now, as the modulator really gives it, at the measured current.
         output.power_w =
             begins.map_or(0.0, |mean| 1.5 * input.link_v * mean.dot(input.measured.currents_a.clarke()));
+    }
+
+    /// Calibrates the zero of the position sensor for an operator's slot, if that is wanted and nothing is demanded.
+    pub fn calibrate(&mut self, wanted: bool, demand: &MotorDemand, tables: &Tables) {
+        let rests = matches!(demand, MotorDemand::Torque(demand) if demand.torque_nm == 0.0);
+        self.calibrating = wanted
+            && rests
+            && self.controller.unexplained_v().is_some_and(|unexplained_v| {
+                self.zero.learn(&WithoutTorque {
+                    unexplained_v,
+                    omega: self.controller.omega(),
+                    max_omega: tables.ratings.max_speed_rad_s * tables.ratings.pole_pairs,
+                    magnets_wb: tables.ratings.magnet_flux_wb,
+                    length_s: SLOT_S,
+                })
+            });
     }
 
     /// Finds the machine's differences from its map in the voltage that nothing explains, while pulses are made on a link of `link_v`.

@@ -7,7 +7,7 @@ use crate::drive::acknowledge::Acknowledge;
 use crate::drive::{Gates, PeriodInput, SlotTimer};
 use crate::frames::{Angle, SQRT_3};
 use crate::machine::{Machine, Tables};
-use crate::ports::{ControlPort, Dual, DualReport, DualSample, HardwareBreak, MotorDemand};
+use crate::ports::{ControlPort, Dual, DualDriveCommand, DualReport, DualSample, HardwareBreak, MotorDemand};
 use crate::protection::{self, FailedCheck, Fault, MaskedFaults, SafeState, Trip};
 use crate::recorder::{DualRecord, DualState};
 use crate::time::Instant;
@@ -180,9 +180,22 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             recorder.record(self.entry(now, input, gates), self.trip.is_some());
         }
         if self.operated && self.slots.begins() {
+            if input.command.calibrate | self.axes.iter().any(|axis| axis.calibrating) {
+                self.calibrate(input.command, gates == Gates::Pulse);
+            }
             shared.operator.tell(now, &self.report(input));
         }
         port.report(now, || self.report(input));
+    }
+
+    /// Calibrates the zeros of both position sensors for a slot, each if that is possible.
+    #[cold]
+    #[inline(never)]
+    fn calibrate(&mut self, command: &DualDriveCommand, pulsing: bool) {
+        let tables = self.machine.tables();
+        for (axis, demand) in self.axes.iter_mut().zip(&command.demands) {
+            axis.calibrate(command.calibrate && pulsing, demand, tables);
+        }
     }
 
     /// The period's report.
@@ -203,6 +216,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             source_v: sample.source_v,
             speed_known: upper.speed_is_known() && lower.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
+            angle_zeros: [upper.zero.angle(), lower.zero.angle()],
+            calibrating: [upper.calibrating, lower.calibrating],
         }
     }
 
@@ -250,6 +265,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     fn track(&mut self, input: Input, port: &mut impl ControlPort<Dual>) -> [Angle; 2] {
         let [first, second] = input.sample.angles;
         let enable = input.command.enable;
+        let [upper_axis, lower_axis] = &self.axes;
+        let first = first.map(|angle| angle + upper_axis.zero.angle());
+        let second = second.map(|angle| angle + lower_axis.zero.angle());
         let upper = self.follow::<0>(first, enable);
         let lower = self.follow::<1>(second, enable);
         // The upper motor's first if both are lost.

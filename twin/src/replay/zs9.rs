@@ -134,6 +134,7 @@ impl Tasks for Host {
             link_ref_v: f32::from_bits(link),
             scheme: Scheme::from_code(flags >> 16),
             acknowledge: (flags >> 8) as u8,
+            calibrate: flags & 8 != 0,
         });
     }
 

@@ -109,6 +109,7 @@ impl Bench {
             link_ref_v: self.settings.link_ref_v as f32,
             scheme: held(&self.course.schemes, t_s).unwrap_or(self.settings.scheme),
             acknowledge: 0,
+            calibrate: false,
         };
         self.spoiler.control(t_s, &mut sample, &mut command);
         self.compare(true_a, sample.currents_a);

@@ -10,6 +10,7 @@ use crate::control::{
     AimInput, AngleHarmonics, ControlLaw, DeadTime, Demand, Law, LinkDamper, Measurements, Regulated,
     RotorSample, WithoutTorque,
 };
+use crate::drive::SLOT_S;
 use crate::frames::{Angle, SinCos, six_step_v};
 use crate::machine::Machine;
 use crate::modulation::{Mode, Reference, SwitchLimits};
@@ -19,9 +20,6 @@ use crate::time::Instant;
 
 /// Share of the largest torque beyond which a jump of the demand is worth revising the next half.
 const JUMP_SHARE: f32 = 0.05;
-
-/// Time between two reports to the operator, in s.
-const SLOT_S: f32 = 1e-3;
 
 /// Control periods that the running half must still last for the next one to be revised: one until the command is valid, and one in which control
 /// sees the result.
@@ -126,8 +124,10 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             let angle = angle - Angle::within_half_turn(self.controller.omega() * age_s);
             let there = RotorSample::new(self.gains.without(self.zeros.without(currents_a)), angle, tables);
             self.controller.learn(&boundary, &there, follows(slot.key.mode), &Law { gains, clock, tables });
-            let (unexplained_v, omega) = (self.controller.unexplained_v(), self.controller.omega());
-            self.unexplained.step(unexplained_v, 0.0, omega, boundary.length_s, tables);
+            if let Some(unexplained_v) = self.controller.unexplained_v() {
+                let omega = self.controller.omega();
+                self.unexplained.step(unexplained_v, 0.0, omega, boundary.length_s, tables);
+            }
         }
     }
 
@@ -139,12 +139,14 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let rests = command.calibrate && pulsing && command.demand.torque_nm == 0.0;
         self.calibrating = rests
             && follows(self.mode) == Regulated::Mean
-            && self.harmonics.learn_zero(&WithoutTorque {
-                unexplained_v: self.controller.unexplained_v(),
-                omega: self.controller.omega(),
-                max_omega: ratings.max_speed_rad_s * ratings.pole_pairs,
-                magnets_wb: ratings.magnet_flux_wb,
-                length_s: SLOT_S,
+            && self.controller.unexplained_v().is_some_and(|unexplained_v| {
+                self.harmonics.learn_zero(&WithoutTorque {
+                    unexplained_v,
+                    omega: self.controller.omega(),
+                    max_omega: ratings.max_speed_rad_s * ratings.pole_pairs,
+                    magnets_wb: ratings.magnet_flux_wb,
+                    length_s: SLOT_S,
+                })
             });
     }
 
