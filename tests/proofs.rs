@@ -196,7 +196,7 @@ fn every_word_of_a_command_to_the_zs9_comes_back_as_it_was() {
         assert_eq!(every_word(Payload(levels | 1 << 35), again), [64_001, 16, 64_001]);
     }
     let again = |payload| Zs9Link::decode(payload, Scales::USUAL).map(|link| link.encode(Scales::USUAL).ok());
-    assert_eq!(every_word(Payload(0), again), [65_001, 1, 1], "0 to 6,500 V by tenths");
+    assert_eq!(every_word(Payload(0), again), [65_001, 2, 1], "0 to 6,500 V by tenths; to calibrate or not");
 }
 
 #[test]

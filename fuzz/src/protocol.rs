@@ -63,14 +63,14 @@ struct Bus {
     to_drive: &'static [&'static Message],
     /// A valid command's content, of a torque in N·m.
     pull: fn(f32) -> Payload,
-    counters: [Counter; 6],
+    counters: [Counter; 5],
     seen: Vec<Frame>,
 }
 
 impl Bus {
     fn new() -> Self {
         let pull = |torque_nm| Command { torque_nm, ..Command::default() }.encode(Scales::USUAL).unwrap();
-        Self { to_drive: &TO_DRIVE, pull, counters: [Counter::new(); 6], seen: Vec::new() }
+        Self { to_drive: &TO_DRIVE, pull, counters: [Counter::new(); 5], seen: Vec::new() }
     }
 
     fn of_zs9() -> Self {

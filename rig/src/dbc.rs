@@ -115,7 +115,7 @@ pub fn text(ratings: &Ratings) -> String {
     }
     text +=
         "\nCM_ \"Every message carries end-to-end protection after AUTOSAR profile 2: see protocol.md.\";\n";
-    text += "BA_DEF_ BO_ \"GenMsgCycleTime\" INT 0 65535;\nBA_DEF_ BO_ \"DataIdNumber\" INT 0 31;\n";
+    text += "BA_DEF_ BO_ \"GenMsgCycleTime\" INT 0 65535;\nBA_DEF_ BO_ \"DataIdNumber\" INT 1 31;\n";
     text += "BA_DEF_DEF_ \"GenMsgCycleTime\" 0;\nBA_DEF_DEF_ \"DataIdNumber\" 1;\n";
     for (message, _) in messages() {
         let _ = writeln!(text, "BA_ \"GenMsgCycleTime\" BO_ {} {};", message.id, message.period_ms);

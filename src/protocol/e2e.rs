@@ -11,7 +11,7 @@ pub type DataIds = [u8; 16];
 /// Largest step of the counter that is accepted: up to two frames may be lost in a row.
 pub const MAX_DELTA: u8 = 3;
 
-/// The data identifiers of the message with this number, 0 ..= 31: the upper half of each is the number's lower half, the lower half is the counter,
+/// The data identifiers of the message with this number, 1 ..= 31: the upper half of each is the number's lower half, the lower half is the counter,
 /// with its highest bit inverted from number 16 on. So no two messages share an identifier at the same counter.
 pub const fn data_ids(number: u8) -> DataIds {
     let turned = if number & 0x10 != 0 { 8 } else { 0 };

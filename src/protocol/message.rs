@@ -17,7 +17,7 @@ pub struct Message {
     pub name: &'static str,
     /// CAN identifier, 11 bits.
     pub id: u16,
-    /// Number for the protection, 0 ..= 31.
+    /// Number for the protection, 1 ..= 31.
     pub number: u8,
     /// Time from one to the next, in ms; 0 if it is sent on occasion.
     pub period_ms: u16,

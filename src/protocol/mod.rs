@@ -65,9 +65,8 @@ pub const FROM_DRIVE: [&Message; 11] = [
 
 pub use traction::{Content, Traction};
 pub use zs9::{
-    FROM_ZS9, MotorMeasured, TO_ZS9, ZS9_CALIBRATION, ZS9_COMMAND, ZS9_LIMITS, ZS9_LINK,
-    ZS9_PARAMETER_REQUEST, ZS9_STATUS, Zs9, Zs9Calibration, Zs9Command, Zs9Content, Zs9Demands, Zs9Link,
-    Zs9Measured,
+    FROM_ZS9, MotorMeasured, TO_ZS9, ZS9_COMMAND, ZS9_LIMITS, ZS9_LINK, ZS9_PARAMETER_REQUEST, ZS9_STATUS,
+    Zs9, Zs9Command, Zs9Content, Zs9Demands, Zs9Link, Zs9Measured,
 };
 
 /// The receiver of the messages to the PMaSynRM drive.

@@ -58,7 +58,7 @@ impl Channel {
 const SILENCE_MS: u32 = 1_000;
 
 /// Most messages to a drive.
-const MOST: usize = 6;
+const MOST: usize = 5;
 
 /// The receiver of all messages to a drive.
 #[derive(Clone, Copy, Debug)]

@@ -22,8 +22,8 @@ use crate::operator::{DualDemands, DualRequest, Levels, MotorRequest, Wanted};
 use crate::ports::DualReport;
 use crate::thermal::Temperatures;
 
-/// [`COMMAND`](super::COMMAND)'s, in a message of its own: [`ZS9_COMMAND`] is full.
-const CALIBRATE: Signal = Signal::flag("calibrate", 12);
+/// [`COMMAND`](super::COMMAND)'s, in another message: [`ZS9_COMMAND`] is full.
+const CALIBRATE: Signal = Signal::flag("calibrate", 32);
 const KIND: Signal = Signal::number("page", 35, 1, 1);
 const TORQUES: [Signal; 2] = [
     Signal::physical("torque1_nm", "N.m", 16, 0.1, TORQUE_NM).of(Quantity::Torque).on_page(0),
@@ -77,11 +77,10 @@ pub const ZS9_LIMITS: [Message; 2] = [
     Message::new("ZS9_LIMITS_2", 0x113, 19, 100, &[MOTORING, BRAKING, SPEED_LIMIT])
         .telling(12, &[Quantity::Torque, Quantity::Speed]),
 ];
-/// The link's voltage outside shoot-through; the nominal one until this message comes.
+/// The link's voltage outside shoot-through, and whether the zeros of both position sensors are to be calibrated; the nominal voltage and no calibration until
+/// this message comes.
 pub const ZS9_LINK: Message =
-    Message::new("ZS9_LINK", 0x114, 20, 100, &[LINK_REF]).telling(12, &[Quantity::Voltage]);
-/// The zeros of both position sensors are to be calibrated; not, until it comes.
-pub const ZS9_CALIBRATION: Message = Message::new("ZS9_CALIBRATION", 0x116, 31, 100, &[CALIBRATE]);
+    Message::new("ZS9_LINK", 0x114, 20, 100, &[LINK_REF, CALIBRATE]).telling(12, &[Quantity::Voltage]);
 /// Reads or writes a parameter.
 pub const ZS9_PARAMETER_REQUEST: Message =
     Message::new("ZS9_PARAMETER_REQUEST", 0x115, 21, 0, &[WRITE, PARAMETER, VALUE]);
@@ -104,7 +103,7 @@ const LINK_STATE: Message =
     Message::new("ZS9_LINK_STATE", 0x194, 25, 10, &[LINK, CAPACITOR, DUTY]).telling(12, &[Quantity::Voltage]);
 /// Corrections of both position sensors' zeros.
 const ANGLE_ZEROS: Message =
-    Message::new("ZS9_ANGLE_ZEROS", 0x199, 0, 100, &[ZEROS[0], ZEROS[1], CALIBRATING[0], CALIBRATING[1]]);
+    Message::new("ZS9_ANGLE_ZEROS", 0x199, 31, 100, &[ZEROS[0], ZEROS[1], CALIBRATING[0], CALIBRATING[1]]);
 const FAULT_VALUE: Message = Message::new("ZS9_FAULT_VALUE", 0x195, 26, 100, &[TRIP_FAULT, TRIP_VALUE]);
 const FAULT_LIMIT: Message = Message::new("ZS9_FAULT_LIMIT", 0x196, 27, 100, &[TRIP_FAULT, TRIP_LIMIT]);
 const COUNTERS: Message = Message::new("ZS9_COUNTERS", 0x197, 28, 100, &COUNTER_SIGNALS);
@@ -112,8 +111,8 @@ const PARAMETER_ANSWER: Message =
     Message::new("ZS9_PARAMETER_ANSWER", 0x198, 29, 0, &[ANSWER_RESULT, ANSWER_PARAMETER, ANSWER_VALUE]);
 
 /// The messages to the ZS9.
-pub const TO_ZS9: [&Message; 6] =
-    [&ZS9_COMMAND, &ZS9_LIMITS[0], &ZS9_LIMITS[1], &ZS9_LINK, &ZS9_PARAMETER_REQUEST, &ZS9_CALIBRATION];
+pub const TO_ZS9: [&Message; 5] =
+    [&ZS9_COMMAND, &ZS9_LIMITS[0], &ZS9_LIMITS[1], &ZS9_LINK, &ZS9_PARAMETER_REQUEST];
 
 /// The messages from the ZS9.
 pub const FROM_ZS9: [&Message; 9] = [
@@ -183,6 +182,8 @@ impl Zs9Command {
 pub struct Zs9Link {
     /// Desired link voltage outside shoot-through, in V.
     pub link_ref_v: f32,
+    /// The zeros of both position sensors are to be calibrated, as long as no torque is demanded.
+    pub calibrate: bool,
 }
 
 impl Zs9Link {
@@ -190,35 +191,14 @@ impl Zs9Link {
     pub fn encode(&self, scales: Scales) -> Result<Payload, OutOfRange> {
         let mut payload = Payload::default();
         LINK_REF.put_on(scales, &mut payload, self.link_ref_v)?;
+        CALIBRATE.put_raw(&mut payload, self.calibrate.into());
         Ok(payload)
     }
 
     /// From a frame's content; `None` if the value is out of its range or an unused bit is set.
     pub fn decode(payload: Payload, scales: Scales) -> Option<Self> {
         ZS9_LINK.is_tidy(payload).then_some(())?;
-        Some(Self { link_ref_v: LINK_REF.get_on(scales, payload)? })
-    }
-}
-
-/// Content of [`ZS9_CALIBRATION`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Zs9Calibration {
-    /// The zeros of both position sensors are to be calibrated.
-    pub calibrate: bool,
-}
-
-impl Zs9Calibration {
-    /// As a frame's content.
-    pub fn encode(&self) -> Payload {
-        let mut payload = Payload::default();
-        CALIBRATE.put_raw(&mut payload, self.calibrate.into());
-        payload
-    }
-
-    /// From a frame's content; `None` if an unused bit is set.
-    pub fn decode(payload: Payload) -> Option<Self> {
-        ZS9_CALIBRATION.is_tidy(payload).then(|| Self { calibrate: CALIBRATE.is_set(payload) })
+        Some(Self { link_ref_v: LINK_REF.get_on(scales, payload)?, calibrate: CALIBRATE.is_set(payload) })
     }
 }
 
@@ -232,12 +212,10 @@ pub enum Zs9Content {
     Command(Zs9Command),
     /// Limits of torque and speed of the upper motor (0) or of the lower one (1).
     Limits(usize, TorqueLimits),
-    /// The link's voltage.
+    /// The link's voltage, and the calibration.
     Link(Zs9Link),
     /// A parameter is to be read or written.
     Parameter(ParameterRequest),
-    /// The zeros are to be calibrated, or not.
-    Calibration(Zs9Calibration),
 }
 
 /// The measurements of one motor. `None`: not available.
@@ -314,7 +292,6 @@ pub struct Zs9 {
     command: Zs9Command,
     limits: [Option<TorqueLimits>; 2],
     link: Option<Zs9Link>,
-    calibrate: bool,
 }
 
 impl MessageSet for Zs9 {
@@ -327,8 +304,7 @@ impl MessageSet for Zs9 {
     const FROM_DRIVE: &'static [&'static Message] = &FROM_ZS9;
     const IS_ZS9: bool = true;
     const GREETING: Zs9Content = Zs9Content::Greeting;
-    const SILENT: Self =
-        Self { command: Zs9Command::AT_REST, limits: [None; 2], link: None, calibrate: false };
+    const SILENT: Self = Self { command: Zs9Command::AT_REST, limits: [None; 2], link: None };
 
     fn decode(id: u16, payload: Payload, scales: Scales) -> Option<Zs9Content> {
         let [first, second] = &ZS9_LIMITS;
@@ -338,7 +314,6 @@ impl MessageSet for Zs9 {
             id if id == second.id => Zs9Content::Limits(1, TorqueLimits::decode(payload, scales)?),
             id if id == ZS9_LINK.id => Zs9Content::Link(Zs9Link::decode(payload, scales)?),
             id if id == ZS9_PARAMETER_REQUEST.id => Zs9Content::Parameter(ParameterRequest::decode(payload)?),
-            id if id == ZS9_CALIBRATION.id => Zs9Content::Calibration(Zs9Calibration::decode(payload)?),
             _ => return None,
         })
     }
@@ -357,14 +332,13 @@ impl MessageSet for Zs9 {
                 }
             }
             Zs9Content::Link(link) => self.link = Some(link),
-            Zs9Content::Calibration(calibration) => self.calibrate = calibration.calibrate,
             Zs9Content::Parameter(request) => return Taken::Parameter(request),
         }
         Taken::Kept
     }
 
     fn rest(&mut self) {
-        (self.command, self.calibrate) = (Zs9Command::AT_REST, false);
+        self.command = Zs9Command::AT_REST;
     }
 
     /// Once the command is old, a speed demand becomes zero torque.
@@ -381,11 +355,12 @@ impl MessageSet for Zs9 {
             limits: motor_limits(sent.as_ref(), parameters, ratings),
         };
         let [_, _, nominal_v] = dual::Settings::link_range_v(ratings);
+        let link = self.link.unwrap_or(Zs9Link { link_ref_v: nominal_v, calibrate: false });
         let levels = if armed { levels } else { Levels { off: levels.off, ..Zs9Command::AT_REST.levels } };
         DualRequest {
-            levels: Levels { calibrate: armed && fresh && self.calibrate, ..levels },
+            levels: Levels { calibrate: armed && fresh && link.calibrate, ..levels },
             motors: [motor(first, limits1), motor(second, limits2)],
-            link_ref_v: self.link.map_or(nominal_v, |link| link.link_ref_v),
+            link_ref_v: link.link_ref_v,
         }
     }
 

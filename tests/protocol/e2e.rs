@@ -47,7 +47,7 @@ fn all() -> impl Iterator<Item = &'static Message> {
 fn no_two_messages_share_a_data_identifier_at_one_counter() {
     let mut seen = std::collections::BTreeSet::new();
     for message in all() {
-        assert!((0..=31).contains(&message.number) && message.id < 0x800, "{}", message.name);
+        assert!((1..=31).contains(&message.number) && message.id < 0x800, "{}", message.name);
         assert_eq!(*message.data_ids(), data_ids(message.number));
         let ids = message.data_ids().iter().enumerate();
         assert!(ids.into_iter().all(|place| seen.insert((place.0, *place.1))), "{}", message.name);
@@ -92,7 +92,7 @@ proptest! {
     }
 
     #[test]
-    fn another_implementation_takes_our_frames_and_we_take_its(content: [u8; 8], number in 0_u8..=31) {
+    fn another_implementation_takes_our_frames_and_we_take_its(content: [u8; 8], number in 1_u8..=31) {
         let ids = data_ids(number);
         let settings = Profile22Config { data_id_list: ids, ..Profile22Config::default() };
         let mut other = Profile22::new(settings.clone()).unwrap();

@@ -79,10 +79,30 @@ fn each_motor_has_its_limits_and_the_link_its_voltage() {
         assert_eq!(other, nominal.motors[0].limits);
     }
     let mut stream = Stream::of(&ZS9_LINK);
-    for _ in 0..2 {
-        session.listen(1, Some(&stream.frame(Zs9Link { link_ref_v: 700.0 }.encode(Scales::USUAL).unwrap())));
+    for calibrate in [true, true, false] {
+        let link = Zs9Link { link_ref_v: 700.0, calibrate };
+        session.listen(1, Some(&stream.frame(link.encode(Scales::USUAL).unwrap())));
     }
     assert_eq!(session.listen(1, None::<Frame>).link_ref_v, 700.0);
+}
+
+/// The zeros are calibrated while the message says so, and no longer than commands come.
+#[test]
+fn the_zeros_are_calibrated_while_commands_come() {
+    let (mut commands, mut links) = (Stream::of(&ZS9_COMMAND), Stream::of(&ZS9_LINK));
+    let mut session = armed(&mut commands);
+    let at_rest = || command(true, Zs9Demands::Torques([0.0; 2]));
+    let calibrates = |session: &mut Zs9Session, links: &mut Stream, calibrate| {
+        let link = Zs9Link { link_ref_v: 667.0, calibrate };
+        session.listen(1, Some(&links.frame(link.encode(Scales::USUAL).unwrap()))).levels.calibrate
+    };
+    assert!(!calibrates(&mut session, &mut links, true), "the first frame only sets the counter");
+    assert!(calibrates(&mut session, &mut links, true));
+    assert!(!calibrates(&mut session, &mut links, false));
+    assert!(calibrates(&mut session, &mut links, true));
+    assert!(session.listen(1, Some(&commands.frame(at_rest()))).levels.calibrate);
+    let silent = (0..2_000).find(|_| !session.listen(1, None::<Frame>).levels.calibrate);
+    assert!(silent.is_some(), "commands have stopped");
 }
 
 #[test]

@@ -21,26 +21,27 @@ const MOST_MOVED: f32 = 0.15;
 pub struct SourceDamper {
     /// The source's slow value, in V.
     slow_v: f32,
-    /// Shift of the capacitors' reference, in V.
+    /// Shift of the capacitors' reference, in V, and its slope in the newest period, in V/s.
     pub moved_v: f32,
+    pub moves_v_s: f32,
 }
 
 impl SourceDamper {
     /// On a source that has stood at `slow_v`.
     pub const fn at(slow_v: f32) -> Self {
-        Self { slow_v, moved_v: 0.0 }
+        Self { slow_v, moved_v: 0.0, moves_v_s: 0.0 }
     }
 
-    /// One period, in s, and the slope of the shift in it, in V/s. The source gives `G u Δu` more than the motors take, with the conductance G in S;
-    /// that charges both capacitors, of `c` farad and at `v` volt each: `2 C v dv/dt = G u Δu`.
-    pub fn step(self, source_v: f32, (c, v): (f32, f32), damping_s: f32, period_s: f32) -> (Self, f32) {
-        let slow_v = self.slow_v + SLOW_RAD_S * period_s * (source_v - self.slow_v);
-        let charging_w = damping_s * source_v * (source_v - slow_v);
+    /// One period, in s. The source gives `G u Δu` more than the motors take, with the conductance G in S; that charges both capacitors, of `c` farad and at `v`
+    /// volt each: `2 C v dv/dt = G u Δu`.
+    pub fn step(&mut self, source_v: f32, (c, v): (f32, f32), damping_s: f32, period_s: f32) {
+        self.slow_v += SLOW_RAD_S * period_s * (source_v - self.slow_v);
+        let charging_w = damping_s * source_v * (source_v - self.slow_v);
         let charging_v_s = charging_w / (2.0 * c * v);
-        let most_v = MOST_MOVED * slow_v;
-        let wanted_v = self.moved_v + period_s * (charging_v_s - SLOW_RAD_S * self.moved_v);
-        let moved_v = limit(wanted_v, -most_v, most_v);
-        (Self { slow_v, moved_v }, (moved_v - self.moved_v) / period_s)
+        let (before_v, most_v) = (self.moved_v, MOST_MOVED * self.slow_v);
+        let wanted_v = before_v + period_s * (charging_v_s - SLOW_RAD_S * before_v);
+        self.moved_v = limit(wanted_v, -most_v, most_v);
+        self.moves_v_s = (self.moved_v - before_v) / period_s;
     }
 }
 
@@ -54,10 +55,11 @@ mod tests {
     /// The energy that the capacitors have taken while the source was 4 V higher than before: `G u Δu`, as long as the slow value has not followed.
     #[test]
     fn the_capacitors_take_what_the_conductance_says() {
-        let (damper, slope) = SourceDamper::at(400.0).step(404.0, CAPACITORS, 0.3, PERIOD_S);
-        let power_w = 2.0 * CAPACITORS.0 * CAPACITORS.1 * slope;
+        let mut damper = SourceDamper::at(400.0);
+        damper.step(404.0, CAPACITORS, 0.3, PERIOD_S);
+        let power_w = 2.0 * CAPACITORS.0 * CAPACITORS.1 * damper.moves_v_s;
         assert!((power_w / (0.3 * 404.0 * 4.0) - 1.0).abs() < 0.003, "{power_w}");
-        assert_eq!(damper.moved_v, slope * PERIOD_S);
+        assert_eq!(damper.moved_v, damper.moves_v_s * PERIOD_S);
     }
 
     /// A step of the source shifts the reference, by `G u Δu/(2 C v e 20/s)` at most, and it returns; a large one shifts it to its limit.
@@ -66,7 +68,7 @@ mod tests {
         for (to_v, expected_v) in [(410.0, 42.4), (800.0, MOST_MOVED * 800.0)] {
             let (mut damper, mut largest_v) = (SourceDamper::at(400.0), 0.0_f32);
             for _ in 0..10_000 {
-                (damper, _) = damper.step(to_v, CAPACITORS, 0.3, PERIOD_S);
+                damper.step(to_v, CAPACITORS, 0.3, PERIOD_S);
                 largest_v = largest_v.max(damper.moved_v);
             }
             assert!((largest_v / expected_v - 1.0).abs() < 0.01, "{largest_v} V");

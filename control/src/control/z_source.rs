@@ -199,7 +199,7 @@ impl ZSource {
     /// One period: the duty for the next.
     ///
     /// # Errors
-    /// If a number would not be finite, or there is no source; the state then stays as it was.
+    /// If a number would not be finite, or there is no source; the loops' state then stays as it was.
     pub fn step(
         &mut self,
         input: &ZSourceInput,
@@ -225,10 +225,12 @@ impl ZSource {
         let ratio = led_v * per_source;
 
         // Outer loop. While the reference moves, the capacitors' charging current is known beforehand.
-        let damped = (design.damping_s > 0.0).then(|| self.damped(input, design));
-        let (damper, moving) = damped.unwrap_or((SourceDamper::at(0.0), 0.0));
-        let error_v = 0.5 * (led_v + source_v) + damper.moved_v - capacitor_v;
-        let moving_v_s = 0.5 * (led_v - at_least(from_v, source_v)) / design.period_s + moving;
+        if design.damping_s > 0.0 {
+            self.damp(input, design);
+        }
+        let SourceDamper { moved_v, moves_v_s, .. } = self.damper;
+        let error_v = 0.5 * (led_v + source_v) + moved_v - capacitor_v;
+        let moving_v_s = 0.5 * (led_v - at_least(from_v, source_v)) / design.period_s + moves_v_s;
         let charging_a = design.capacitance_f * moving_v_s;
         let into_capacitor_a = gains.outer_s * error_v;
         let wanted_a = power_w * per_source + ratio * (charging_a + into_capacitor_a) + self.integral_a;
@@ -257,19 +259,20 @@ impl ZSource {
         if !(duty + link_v + led_v + inductor_ref_a + integral_a).is_finite() {
             return Err(ZSourceError::NotFinite);
         }
-        self.damper = damper;
         (self.link_ref_v, self.integral_a) = (Some(led_v), integral_a);
         Ok(ZSourceOutput { duty, link_v, link_ref_v: led_v, inductor_ref_a, limited })
     }
 
-    /// The damping of the source's swing after a period, and the slope of its shift. Out of line: most sources are stiff.
+    /// Damps the source's swing. Out of line: most sources are stiff.
     #[cold]
     #[inline(never)]
-    fn damped(&self, input: &ZSourceInput, design: &ZSourceDesign) -> (SourceDamper, f32) {
+    fn damp(&mut self, input: &ZSourceInput, design: &ZSourceDesign) {
         let ZSourceInput { capacitor_v, source_v, .. } = *input;
-        let before = if self.link_ref_v.is_some() { self.damper } else { SourceDamper::at(source_v) };
+        if self.link_ref_v.is_none() {
+            self.damper = SourceDamper::at(source_v);
+        }
         let capacitors = (design.capacitance_f, at_least(capacitor_v, source_v));
-        before.step(source_v, capacitors, design.damping_s, design.period_s)
+        self.damper.step(source_v, capacitors, design.damping_s, design.period_s);
     }
 }
 

@@ -6,8 +6,8 @@ use tractive::operator::Levels;
 use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
     COMMAND, Command, Frame, LIMITS, LINK_LIMITS, LinkLimits, Message, OutOfRange, PARAMETER_REQUEST,
-    ParameterRequest, Payload, Scales, TO_ZS9, TorqueLimits, ZS9_CALIBRATION, ZS9_COMMAND, ZS9_LINK,
-    ZS9_PARAMETER_REQUEST, Zs9Calibration, Zs9Command, Zs9Demands, Zs9Link,
+    ParameterRequest, Payload, Scales, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LINK, ZS9_PARAMETER_REQUEST,
+    Zs9Command, Zs9Demands, Zs9Link,
 };
 
 /// The command that is sent.
@@ -82,9 +82,6 @@ pub struct Sender {
     limits: [Counter; 2],
     link_limits: Counter,
     parameter: Counter,
-    calibration: Counter,
-    /// The ZS9's zeros have been asked to be calibrated.
-    calibrates: bool,
     /// Limits to repeat, of either motor.
     pub torque_limits: [Option<TorqueLimits>; 2],
     /// Limits to repeat.
@@ -142,13 +139,6 @@ impl Sender {
         Ok(Some(message.frame(content, &mut self.link_limits)))
     }
 
-    /// The ZS9's message to calibrate, or no longer, once it has been wanted.
-    fn calibration(&mut self, calibrate: bool) -> Option<Frame> {
-        self.calibrates |= calibrate;
-        let wanted = self.system == System::Zs9 && self.calibrates;
-        wanted.then(|| ZS9_CALIBRATION.frame(Zs9Calibration { calibrate }.encode(), &mut self.calibration))
-    }
-
     /// Sends the newest commands again, the newest first.
     pub fn replay(&mut self, count: u32) {
         self.extra.extend((0..count as usize).map(Extra::Old));
@@ -181,7 +171,6 @@ impl Sender {
             (3, 3) => self.motor_limits(0)?,
             (3, 13) => self.link()?,
             (3, 23) => self.motor_limits(1)?,
-            (3, 33) => self.calibration(command.levels.calibrate),
             (5, _) => match self.requests.pop_front() {
                 Some(request) => Some(parameter_message.frame(request.encode()?, &mut self.parameter)),
                 None => None,

@@ -10,6 +10,7 @@ use crate::speed_loop::SpeedLoop;
 use anyhow::{Result, anyhow, bail};
 use indicatif::ProgressBar;
 use std::fmt::Write as _;
+use tractive::drive::dual::Settings;
 use tractive::machine::Ratings;
 use tractive::protocol::{Frame, ParameterRequest, Zs9Link};
 
@@ -59,6 +60,8 @@ pub struct Talk {
     speed_loop: Option<SpeedLoop>,
     inertia_kg_m2: f64,
     largest_nm: f64,
+    /// The ZS9's until another link voltage is asked for.
+    nominal_link: Zs9Link,
     loads_nm: [f64; 2],
     sender: Sender,
     /// The listener to the telemetry.
@@ -83,6 +86,7 @@ impl Talk {
     /// A talk at rest: the speed loop is made for this inertia and for the largest torque, the steps of all signals for the ratings.
     pub fn new(system: System, lines: Lines, inertia_kg_m2: f64, ratings: &Ratings) -> Self {
         let scales = system.scales(ratings);
+        let [_, _, link_ref_v] = Settings::link_range_v(&Settings::operator_ratings(ratings));
         Self {
             system,
             lines,
@@ -96,6 +100,7 @@ impl Talk {
             speed_loop: None,
             inertia_kg_m2,
             largest_nm: ratings.max_torque_nm.into(),
+            nominal_link: Zs9Link { link_ref_v, calibrate: false },
             loads_nm: [0.0; 2],
             sender: Sender::new(system, scales),
             listener: Listener::new(system, scales),
@@ -107,6 +112,11 @@ impl Talk {
             expectations: 0,
             failures: Vec::new(),
         }
+    }
+
+    /// The message of the ZS9's link, sent from now on.
+    fn link(&mut self) -> &mut Zs9Link {
+        self.sender.link_ref.get_or_insert(self.nominal_link)
     }
 
     /// Logs a frame in candump's format: time, channel, identifier and bytes, T for frames to the drive, R for frames from it.
@@ -167,6 +177,7 @@ impl Talk {
             Action::Charge => self.raise(0),
             Action::Discharge => self.raise(1),
             Action::Acknowledge => self.raise(2),
+            Action::Calibrate(level) if self.system == System::Zs9 => self.link().calibrate = *level,
             Action::Calibrate(level) => levels.calibrate = *level,
             Action::Torque(to, over_s) => {
                 let from = self.command.torques_nm.map(f64::from);
@@ -196,9 +207,7 @@ impl Talk {
             }
             Action::Load(loads_nm) => self.loads_nm = *loads_nm,
             Action::Limits(motor, limits) => self.sender.torque_limits[*motor] = Some(*limits),
-            Action::Link(link_ref_v) => {
-                self.sender.link_ref = Some(Zs9Link { link_ref_v: *link_ref_v as f32 });
-            }
+            Action::Link(link_ref_v) => self.link().link_ref_v = *link_ref_v as f32,
             Action::LinkLimits(limits) => self.sender.link = Some(*limits),
             Action::Read(parameter) => self.ask(ParameterRequest { parameter: *parameter, write: None }),
             Action::Write(parameter, value) => {

@@ -265,28 +265,27 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     fn track(&mut self, input: Input, port: &mut impl ControlPort<Dual>) -> [Angle; 2] {
         let [first, second] = input.sample.angles;
         let enable = input.command.enable;
-        let [upper_axis, lower_axis] = &self.axes;
-        let first = first.map(|angle| angle + upper_axis.zero.angle());
-        let second = second.map(|angle| angle + lower_axis.zero.angle());
-        let upper = self.follow::<0>(first, enable);
-        let lower = self.follow::<1>(second, enable);
+        let (first, upper) = self.follow::<0>(first, enable);
+        let (second, lower) = self.follow::<1>(second, enable);
         // The upper motor's first if both are lost.
         self.check(upper, port);
         self.check(lower, port);
-        [first.unwrap_or(Angle::ZERO), second.unwrap_or(Angle::ZERO)]
+        [first, second]
     }
 
-    /// Follows one rotor.
+    /// Follows one rotor. Returns its angle, and the failed check.
     #[inline(always)]
-    fn follow<const MOTOR: usize>(&mut self, measured: Option<Angle>, enable: bool) -> Option<FailedCheck> {
+    fn follow<const MOTOR: usize>(
+        &mut self,
+        measured: Option<Angle>,
+        enable: bool,
+    ) -> (Angle, Option<FailedCheck>) {
         let (axis, fault) = (&mut self.axes[MOTOR], SENSOR_LOST[MOTOR]);
         let trusted = self.masked.has(fault);
-        match measured {
-            Some(measured) => axis
-                .track(measured, trusted, &self.settings, self.machine.tables())
-                .map(|off_rad| (fault, off_rad, axis::INNOVATION_RAD)),
-            None => axis.lose_angle(fault, enable),
-        }
+        let Some(measured) = measured else { return (Angle::ZERO, axis.lose_angle(fault, enable)) };
+        let angle = measured + axis.zero.angle();
+        let lost = axis.track(angle, trusted, &self.settings, self.machine.tables());
+        (angle, lost.map(|off_rad| (fault, off_rad, axis::INNOVATION_RAD)))
     }
 
     /// The measurements for the control law, with the link as that of a two-level inverter of equal output.
