@@ -103,6 +103,26 @@ fn both_zeros_of_the_zs9_are_calibrated() {
     }
 }
 
+/// Behind a line filter the contactors are open at first: the link's voltage is that of an empty network, and precharging it draws a current out of the line.
+#[test]
+fn the_zs9_is_precharged_through_a_line_filter() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut talk = rig();
+    talk.args(["--system", "zs9", "--line", "3,4,30"])
+        .arg(script("zs9.talk"))
+        .arg("--out")
+        .arg(folder.path());
+    let output = talk.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    let rows = rows(&folder.path().join("trace.csv"));
+    let value =
+        |row: &std::collections::BTreeMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
+    assert!(rows.iter().all(|row| value(row, "uin_v") > -1.0));
+    let precharge = rows.iter().filter(|row| (0.4..0.8).contains(&value(row, "t_s")));
+    let peak_a = precharge.map(|row| value(row, "line_a")).fold(0.0, f64::max);
+    assert!((1.0..30.0).contains(&peak_a), "{peak_a} A");
+}
+
 /// Noise of the current sensors shows before anything flows.
 #[test]
 fn the_flaws_of_real_are_in_a_talk_too() {

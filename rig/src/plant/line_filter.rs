@@ -82,6 +82,11 @@ impl FilteredLink {
         Self { filter, line_v, choke_a: 0.0, udc_v: line_v }
     }
 
+    /// Capacitance of the link, in F.
+    pub const fn capacitance_f(&self) -> f64 {
+        self.filter.capacitance_f
+    }
+
     /// Lets time pass while the inverter takes an energy, in J, and the line goes to a voltage, in V; `None`: the line is disconnected.
     pub fn advance(&mut self, drawn_j: f64, dt_s: f64, line_v: Option<f64>) {
         let LineFilter { inductance_h, resistance_ohm, capacitance_f } = self.filter;

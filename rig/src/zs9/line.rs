@@ -41,14 +41,19 @@ impl LineSide {
         }
     }
 
-    /// Feeds the network from the source over the next `dt_s`.
-    pub fn feed(&self, plant: &mut Zs9Plant, source_v: f64, dt_s: f64) {
+    /// `true` while the main contactor connects source and network.
+    pub fn is_connected(&self) -> bool {
+        self.gear.main_closed()
+    }
+
+    /// Feeds the network from the source over the next `dt_s`. Returns the energy that precharging took from the source, in J.
+    pub fn feed(&self, plant: &mut Zs9Plant, source_v: f64, dt_s: f64) -> f64 {
         let feeding = Feeding {
             main: self.gear.main_closed(),
             precharge: self.gear.precharge_closed(),
             discharge: self.discharge,
         };
-        feeding.feed(&self.times, plant, source_v, dt_s);
+        feeding.feed(&self.times, plant, source_v, dt_s)
     }
 }
 
@@ -64,15 +69,18 @@ pub struct Feeding {
 }
 
 impl Feeding {
-    /// Feeds the network from the source over the next `dt_s`.
-    pub fn feed(&self, times: &LineTimes, plant: &mut Zs9Plant, source_v: f64, dt_s: f64) {
+    /// Feeds the network from the source over the next `dt_s`. Returns the energy that precharging took from the source, in J.
+    pub fn feed(&self, times: &LineTimes, plant: &mut Zs9Plant, source_v: f64, dt_s: f64) -> f64 {
         if self.main {
             plant.source_v = source_v;
-            return;
+            return 0.0;
         }
         let mut capacitor_v = plant.network.capacitor_v();
+        let mut precharging_j = 0.0;
         if self.precharge {
-            capacitor_v += (source_v - capacitor_v) * -libm::expm1(-dt_s / f64::from(times.precharge_s));
+            let rise_v = (source_v - capacitor_v) * -libm::expm1(-dt_s / f64::from(times.precharge_s));
+            capacitor_v += rise_v;
+            precharging_j = 2.0 * plant.parts.capacitance_f * rise_v * source_v;
         }
         if self.discharge {
             capacitor_v *= libm::exp(-dt_s / f64::from(times.discharge_s));
@@ -81,5 +89,6 @@ impl Feeding {
         plant.network = NetworkState::even(0.0, capacitor_v);
         // No current flows between a source and capacitors of equal voltage.
         plant.source_v = capacitor_v;
+        precharging_j
     }
 }

@@ -60,7 +60,7 @@ pub struct Row {
     pub capacitor_v: f64,
     /// Inductor current, mean of both, in A.
     pub inductor_a: f64,
-    /// Source voltage, in V; that of a line filter's capacitor, if there is one.
+    /// Source voltage at the network, in V: behind a line filter that of its capacitor, and while the contactors are open that of the network's own.
     pub source_v: f64,
     /// Current out of the line at the step's end, in A; `None` without a line filter.
     pub line_a: Option<f64>,

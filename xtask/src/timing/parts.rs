@@ -34,7 +34,7 @@ use Group::{Around, Beyond, Paper};
 /// Parts, their groups and their sources: files and folders below `src/` of any of the repository's crates; after a `#`, a word of the function's name.
 /// Among the sources that contain an instruction's file, the longest decides. The innermost function is asked first, then those that it was inlined
 /// into.
-const PARTS: [(&str, Group, &[&str]); 32] = [
+const PARTS: [(&str, Group, &[&str]); 31] = [
     ("frames: vectors, angles, sine and cosine", Paper, &["frames/"]),
     ("look-up in flux map and tables", Paper, &["machine/lookup.rs"]),
     ("MTPA, two passes", Paper, &["control/mtpa.rs"]),
@@ -46,8 +46,7 @@ const PARTS: [(&str, Group, &[&str]); 32] = [
     ("speed loop", Beyond, &["control/speed_loop.rs"]),
     ("disturbance, its sixth harmonic", Beyond, &["control/disturbance.rs"]),
     ("map error", Beyond, &["control/map_error.rs"]),
-    ("swing of a line filter", Beyond, &["control/link_damper.rs", "control/source_damper.rs"]),
-    ("position sensor's errors and zero", Beyond, &["control/angle_harmonics.rs", "control/angle_zero.rs"]),
+    ("position sensor's errors", Beyond, &["control/angle_harmonics.rs"]),
     (
         "current sensors' offsets, gains, delay",
         Beyond,
@@ -57,7 +56,7 @@ const PARTS: [(&str, Group, &[&str]); 32] = [
             "drive/traction/current_delay.rs",
         ],
     ),
-    ("temperatures, demagnetisation", Beyond, &["control/warmth.rs", "control/demagnetisation.rs"]),
+    ("temperatures", Beyond, &["control/warmth.rs"]),
     ("current loop", Paper, &["control/current_loop.rs", "control/flux_path.rs"]),
     ("Z-source", Paper, &["control/z_source.rs"]),
     ("control law, the rest", Paper, &["control/"]),

@@ -195,6 +195,22 @@ impl Zs9Plant {
         self.bridge_v
     }
 
+    /// Lets the bridge's diodes, which conduct before the link reverses, charge the network's capacitors from a source of so many farad that has risen above
+    /// both together; from a stiff one at once.
+    pub fn hold_link(&mut self, source_f: f64) {
+        let below_v = -self.link_v();
+        if below_v <= 0.0 || self.source != Source::Bidirectional {
+            return;
+        }
+        let before_j = self.parts.stored_j(&self.network);
+        let charge_as = below_v / (2.0 / self.parts.capacitance_f + source_f.recip());
+        for volts in &mut self.network.capacitors_v {
+            *volts += charge_as / self.parts.capacitance_f;
+        }
+        self.source_v -= charge_as / source_f;
+        self.energies.source_j += self.parts.stored_j(&self.network) - before_j;
+    }
+
     /// Energy stored in the network and in the motors' fields, in J.
     pub fn stored_j(&self) -> f64 {
         self.parts.stored_j(&self.network) + self.motors.iter().map(Motor::field_j).sum::<f64>()
@@ -227,5 +243,32 @@ impl Zs9Plant {
         let near = upper.iter().zip(&lower).map(|(u, l)| u.abs().min(l.abs()).min((u + l).abs()));
         // A link shorted by the diodes may rise within the step.
         self.clamp.step_near_s(self.link_v().max(LEAST_LINK_V), near.fold(f64::INFINITY, f64::min))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// A source that has risen above both capacitors is their sum from then on; what the network has stored came from the source.
+    #[test]
+    fn diodes_charge_the_network_from_a_source_that_rises() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/ipm-zs9");
+        let machine = MachineFolder::read(&folder).unwrap();
+        let at_rest = || SpeedSource::profile(vec![(0.0, 0.0)]);
+        for (source_f, sum_v) in [(f64::INFINITY, 500.0), (1e-3, 480.0)] {
+            let settings = Zs9Settings::default();
+            let mut plant = Zs9Plant::new([&machine, &machine], [at_rest(), at_rest()], &settings);
+            (plant.source_v, plant.network.capacitors_v) = (500.0, [250.0, 150.0]);
+            let stored_j = plant.stored_j();
+            plant.hold_link(source_f);
+            let [v1, v2] = plant.network.capacitors_v;
+            assert!((v1 + v2 - sum_v).abs() < 1e-9 && (v1 - v2 - 100.0).abs() < 1e-9, "{v1} {v2}");
+            assert!((plant.source_v - sum_v).abs() < 1e-9 && plant.residual_j(stored_j).abs() < 1e-9);
+            plant.source_v = 300.0;
+            plant.hold_link(source_f);
+            assert_eq!((plant.source_v, plant.network.capacitors_v), (300.0, [v1, v2]), "a link above zero");
+        }
     }
 }

@@ -78,12 +78,15 @@ impl LoadStep {
         self.step.unwrap_or(scaled_nm(STEP_NM, machine))
     }
 
-    /// Bounds for a step of at most a third of the largest torque.
+    /// Bounds for a step of at most a third of the largest torque. Behind a line filter they are those of other machines.
     fn verdicts(&self, figures: &Figures, options: &Options, machine: &Machine) -> Vec<Verdict> {
         let judged =
             self.step_nm(machine).abs() <= scaled_nm(STEP_NM, machine) && options.own.inject.is_none();
-        let at_most =
-            |paper: f64, other: f64| if judged { known(machine, paper, other) } else { f64::INFINITY };
+        let at_most = |paper: f64, other: f64| match (judged, options.own.line) {
+            (false, _) => f64::INFINITY,
+            (true, Some(_)) => other,
+            (true, None) => known(machine, paper, other),
+        };
         let (moved_nm, moved_rpm) = (scaled_nm(0.6, machine), scaled_rpm(1.0, machine));
         judge(
             figures,

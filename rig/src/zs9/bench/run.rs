@@ -6,6 +6,7 @@ use crate::inject::zs9::Kind;
 use crate::plant::stopwatch::in_plant;
 use crate::plant::zs9::LegGates;
 use crate::steps::held;
+use crate::zs9::line::LineSide;
 use tractive::protection::SafeState;
 
 /// The capacitor behind the source's contactor, in F: as large as the network's.
@@ -42,7 +43,7 @@ impl Bench {
         }
         let lost = self.spoiler.injected.kind(self.time.now_s()) == Some(Kind::SourceLost);
         if !lost && self.filter.is_none() {
-            return self.integrate_fed(to);
+            return self.integrate_fed(to).map(|_| ());
         }
         let longest = (LONGEST_S / self.time.step_s).round() as Tick;
         while self.time.now + longest < to {
@@ -54,14 +55,16 @@ impl Bench {
     /// With a line filter, or with the source cut off: its capacitor loses the energy that it gives.
     fn integrate_drawn(&mut self, lost: bool, to: Tick) -> Result<(), BenchError> {
         let (before_j, begun) = (self.plant.energies.source_j, self.time.now);
-        self.integrate_fed(to)?;
-        let given_j = self.plant.energies.source_j - before_j;
+        let precharging_j = self.integrate_fed(to)?;
+        let given_j = self.plant.energies.source_j - before_j + precharging_j;
         let dt_s = (to - begun) as f64 * self.time.step_s;
         let line_v = (!lost).then(|| self.line_v());
         match &mut self.filter {
             Some(filter) => {
                 filter.advance(given_j, dt_s, line_v);
-                self.plant.source_v = filter.udc_v;
+                if self.line.as_ref().is_none_or(LineSide::is_connected) {
+                    self.plant.source_v = filter.udc_v;
+                }
             }
             None => {
                 let square = self.plant.source_v.powi(2) - 2.0 * given_j / INPUT_F;
@@ -71,12 +74,15 @@ impl Bench {
         Ok(())
     }
 
-    fn integrate_fed(&mut self, to: Tick) -> Result<(), BenchError> {
+    /// Returns the energy that went into precharging, in J.
+    fn integrate_fed(&mut self, to: Tick) -> Result<f64, BenchError> {
         let steps = (to - self.time.now) as f64;
         let supply_v = self.behind_contactor_v();
-        if let Some(line) = &self.line {
-            line.feed(&mut self.plant, supply_v, steps * self.time.step_s);
-        }
+        let precharging_j = self
+            .line
+            .as_ref()
+            .map_or(0.0, |line| line.feed(&mut self.plant, supply_v, steps * self.time.step_s));
+        self.plant.hold_link(self.source_f());
         let real = self.real_levels();
         let [uh, vh, wh, um, vm, wm, ul, vl, wl] = real;
         let leg = |high, middle, low| LegGates { high, middle, low };
@@ -100,7 +106,16 @@ impl Bench {
         }
         self.time.now = to;
         self.watch();
-        Ok(())
+        Ok(precharging_j)
+    }
+
+    /// Capacitance at the source's contactor, in F; without end for a stiff source.
+    fn source_f(&self) -> f64 {
+        match (&self.filter, self.spoiler.injected.kind(self.time.now_s())) {
+            (Some(filter), _) => filter.capacitance_f(),
+            (None, Some(Kind::SourceLost)) => INPUT_F,
+            (None, _) => f64::INFINITY,
+        }
     }
 
     fn act(&mut self) -> Result<(), BenchError> {

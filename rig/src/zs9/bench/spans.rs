@@ -94,7 +94,9 @@ impl Spans {
         }
         let (sums, plant) = (std::mem::take(&mut self.sums), std::mem::take(&mut self.plant));
         let wanted = time.now > time.lead && !self.are_all();
-        let means = plant.means(seen.source_v).filter(|_| wanted);
+        // A line filter's voltage moves within the step.
+        let source_v = seen.line_a.map_or(seen.source_v, |_| sums.source_v / sums.steps);
+        let means = plant.means(source_v).filter(|_| wanted);
         let motor = |k: usize, means: &MotorMeans| MotorRow {
             speed_rpm: means.speed_rpm,
             torque_ref_nm: sums.torque_refs[k] / sums.steps,
