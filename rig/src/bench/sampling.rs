@@ -9,9 +9,8 @@ use tractive::ports::{DriveCommand, Report, Sample};
 use tractive::protection::LegFaults;
 use tractive::time::Instant;
 
-/// Largest error of a current reading that does not count as a difference, in A: a tenth of the machine's largest current, which is the tolerance of
-/// the phases' sum. Added to it are a multiple of the sum's own noise, and the converters' steps, in which the error does not show.
-const MUCH_A: f32 = 23.3;
+/// Largest error of a current reading that does not count as a difference, over the machine's largest current: the tolerance of the phases' sum. Added to it are a multiple of the sum's own noise, and the converters' steps, in which the error does not show.
+const MUCH: f64 = 0.1;
 const HIDDEN_NOISES: f64 = 3.0;
 
 /// A control sample with its additional data.
@@ -78,7 +77,7 @@ impl Bench {
     fn read_currents(&mut self, true_a: Abc) -> Abc {
         let read_a = self.spoiler.currents(self.time.now_s(), true_a);
         let off = [read_a.a - true_a.a, read_a.b - true_a.b, read_a.c - true_a.c];
-        let much_a = MUCH_A + self.sensors.hidden_a(HIDDEN_NOISES);
+        let much_a = (MUCH * self.plant.motor.largest_a) as f32 + self.sensors.hidden_a(HIDDEN_NOISES);
         // A value that is not a number counts as off, too.
         if off.iter().any(|off| off.is_nan() || off.abs() > much_a) {
             self.observed.makes_a_difference(self.time.now);

@@ -113,14 +113,22 @@ pub struct Spoiler {
     before: Option<DualSample>,
     current: Option<(usize, CurrentSpoiler)>,
     angle: Option<(usize, AngleSpoiler)>,
+    /// The upper motor's largest current, in A.
+    largest_a: f64,
 }
+
+/// A low and a high source, over its voltage: 250 and 900 V of 400.
+const LOW: f64 = 0.625;
+const HIGH: f64 = 2.25;
+/// An overcurrent over a machine's largest current: 200 A of 85.
+const OVER: f64 = 200.0 / 85.0;
 
 /// The time for which the gate drivers are not ready, in s.
 const DRIVER_FAULT_S: f64 = 0.05;
 
 impl Spoiler {
-    /// Spoils from the injection's instant on.
-    pub fn new(injection: Option<Injection<Kind>>) -> Self {
+    /// Spoils from the injection's instant on, for motors of this largest current, in A.
+    pub fn new(injection: Option<Injection<Kind>>, largest_a: f64) -> Self {
         let (mut current, mut angle) = (None, None);
         match injection.map(|injection| injection.kind) {
             Some(Kind::Current(motor, phase, fault)) => {
@@ -129,7 +137,7 @@ impl Spoiler {
             Some(Kind::Angle(motor, fault)) => angle = Some((motor, AngleSpoiler::new(fault))),
             _ => {}
         }
-        Self { injected: Injected(injection), before: None, current, angle }
+        Self { injected: Injected(injection), before: None, current, angle, largest_a }
     }
 
     /// The converters' reading of the phase currents.
@@ -148,12 +156,12 @@ impl Spoiler {
         (0.0..DRIVER_FAULT_S).contains(&(t_s - injection.at_s)).then_some(Fault::GateDriver)
     }
 
-    /// The source's true voltage, in V.
+    /// The source's true voltage, in V, of a healthy one's.
     pub fn source_v(&self, t_s: f64, source_v: f64) -> f64 {
         match self.injected.kind(t_s) {
             Some(Kind::SourceShort) => 1.0,
-            Some(Kind::SourceLow) => 250.0,
-            Some(Kind::SourceHigh) => 900.0,
+            Some(Kind::SourceLow) => LOW * source_v,
+            Some(Kind::SourceHigh) => HIGH * source_v,
             Some(Kind::SourceSwings(amplitude_v, hz)) => {
                 let since_s = self.injected.since_s(t_s);
                 source_v + amplitude_v * libm::sin(core::f64::consts::TAU * hz * since_s)
@@ -202,7 +210,7 @@ impl Spoiler {
         match self.injected.kind(t_s) {
             Some(Kind::Overcurrent) => {
                 let current = &mut sample.currents_a[0].a;
-                *current = 200.0_f32.copysign(*current);
+                *current = ((OVER * self.largest_a) as f32).copysign(*current);
             }
             Some(Kind::LegStuckOn) => sample.gates.off &= !(1 << 4),
             Some(Kind::LegStuckOff) => sample.gates.on &= !(1 << 2),

@@ -11,6 +11,8 @@ pub struct Motor {
     pub(super) rotor: Rotor,
     pub(super) id_a: f64,
     pub(super) iq_a: f64,
+    /// Largest current of the machine, by its folder, in A.
+    pub largest_a: f64,
     /// Energies since the beginning.
     pub energies: MotorEnergies,
 }
@@ -31,7 +33,14 @@ impl Motor {
     pub(super) fn new(machine: &MachineFolder, speed: SpeedSource, settings: &PlantSettings) -> Self {
         let stator = Stator::new(machine, settings);
         let rotor = Rotor::new(speed, stator.pole_pairs).on_shaft(settings.shaft);
-        Self { stator, rotor, id_a: 0.0, iq_a: 0.0, energies: MotorEnergies::default() }
+        Self {
+            stator,
+            rotor,
+            id_a: 0.0,
+            iq_a: 0.0,
+            largest_a: machine.parameters.max_current_a,
+            energies: MotorEnergies::default(),
+        }
     }
 
     /// Sets the currents, in A.

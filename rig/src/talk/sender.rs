@@ -1,13 +1,15 @@
 //! The frames to the drive, slot by slot, and the damage done to them on the way.
 
+use super::script::{Action, Line};
 use super::system::System;
+use anyhow::{Result, ensure};
 use std::collections::VecDeque;
 use tractive::operator::Levels;
 use tractive::protocol::e2e::Counter;
 use tractive::protocol::{
     COMMAND, Command, Frame, LIMITS, LINK_LIMITS, LinkLimits, Message, OutOfRange, PARAMETER_REQUEST,
-    ParameterRequest, Payload, Scales, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LINK, ZS9_PARAMETER_REQUEST,
-    Zs9Command, Zs9Demands, Zs9Link,
+    ParameterRequest, Payload, Quantity, Scales, TO_ZS9, TorqueLimits, ZS9_COMMAND, ZS9_LINK,
+    ZS9_PARAMETER_REQUEST, Zs9Command, Zs9Demands, Zs9Link,
 };
 
 /// The command that is sent.
@@ -108,6 +110,40 @@ impl Sender {
     /// A sender to a system on these scales, with nothing sent yet.
     pub fn new(system: System, scales: Scales) -> Self {
         Self { system, scales, ..Self::default() }
+    }
+
+    /// Checks that the signals can carry what a line asks for, on the machine's scales.
+    ///
+    /// # Errors
+    /// Names the line, and the largest torque, speed and voltage.
+    pub fn check(&self, line: &Line) -> Result<()> {
+        let fits = match &line.action {
+            Action::Torque(to_nm, _) => {
+                let torques_nm = to_nm.map(|nm| nm as f32);
+                Spoken { torques_nm, ..Spoken::default() }.encode(self.system, self.scales).is_ok()
+            }
+            Action::Speed(to_rpm, _) if self.system == System::Zs9 => {
+                let speeds_rpm = Some(to_rpm.map(|rpm| rpm as f32));
+                Spoken { speeds_rpm, ..Spoken::default() }.encode(self.system, self.scales).is_ok()
+            }
+            Action::Limits(_, limits) => limits.encode(self.scales).is_ok(),
+            Action::LinkLimits(limits) => limits.encode(self.scales).is_ok(),
+            Action::Link(volts) => {
+                Zs9Link { link_ref_v: *volts as f32, calibrate: false }.encode(self.scales).is_ok()
+            }
+            _ => true,
+        };
+        let most = |usual: f32, quantity| usual * self.scales.worth(quantity);
+        ensure!(
+            fits,
+            "line {}: {}: a value is beyond what its signal carries for this machine: {} N·m, {} r/min, {} V at most",
+            line.number,
+            line.text,
+            most(3_000.0, Quantity::Torque),
+            most(16_000.0, Quantity::Speed),
+            most(6_500.0, Quantity::Voltage)
+        );
+        Ok(())
     }
 
     /// Messages of a command and of a parameter.

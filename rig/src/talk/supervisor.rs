@@ -140,6 +140,7 @@ impl Talk {
                 self.next = Some(line);
                 return Ok(());
             }
+            self.sender.check(&line)?;
             self.act(t_s, &line);
             if self.lines.are_typed() {
                 self.wait_until_s = self.wait_until_s.max(t_s + TYPED_S);
@@ -154,6 +155,7 @@ impl Talk {
     /// Names the part that cannot be understood.
     pub fn say(&mut self, t_s: f64, text: &str) -> Result<()> {
         if let Some(line) = script::line(text, 1, self.system)? {
+            self.sender.check(&line)?;
             self.act(t_s, &line);
         }
         Ok(())

@@ -9,12 +9,10 @@
 
 use super::bridge::Bridge;
 use super::step::{Feed, Trial};
-use super::{Source, Zs9Plant};
+use super::{NONE_V, Source, Zs9Plant};
 
 /// Excess that counts as zero, in A.
 const NONE_A: f64 = 1e-6;
-/// Link voltage that counts as zero, in V.
-const NONE_V: f64 = 1e-6;
 /// Longest step while neither source nor diodes conduct, in s: short enough to follow the holding voltage.
 const LONGEST_BLOCKED_S: f64 = 5e-6;
 /// Shortest step, in s, so that time advances even if conduction changes at once.

@@ -31,6 +31,8 @@ use super::{DeviceDrops, PlantSettings, SpeedSource};
 use bridge::Bridge;
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
+/// Voltage below zero by which a link counts as zero, in V.
+const NONE_V: f64 = 1e-6;
 /// Lowest link voltage for which the length of steps is computed, in V.
 const LEAST_LINK_V: f64 = 50.0;
 
@@ -199,7 +201,7 @@ impl Zs9Plant {
     /// both together; from a stiff one at once.
     pub fn hold_link(&mut self, source_f: f64) {
         let below_v = -self.link_v();
-        if below_v <= 0.0 || self.source != Source::Bidirectional {
+        if below_v <= NONE_V || self.source != Source::Bidirectional {
             return;
         }
         let before_j = self.parts.stored_j(&self.network);

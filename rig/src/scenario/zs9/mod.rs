@@ -68,7 +68,8 @@ pub struct Zs9Options {
     #[arg(long, default_value = "rthd", value_parser = scheme)]
     pub scheme: Scheme,
     /// Fault to inject, NAME@SECONDS: source-short, source-low, source-high, sensor-lost-1, sensor-lost-2,
-    /// sensor-frozen-1, sensor-frozen-2, sensor-jump-2, overcurrent, not-finite, leg-stuck-on, leg-stuck-off.
+    /// sensor-frozen-1, sensor-frozen-2, sensor-jump-2, overcurrent, not-finite, leg-stuck-on, leg-stuck-off,
+    /// gate-driver.
     #[arg(long)]
     pub inject: Option<Injection<Kind>>,
     /// Leave the dead time uncompensated: the pulses are not corrected.

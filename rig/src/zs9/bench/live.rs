@@ -60,13 +60,16 @@ impl Bench {
     pub fn inject(&mut self, kind: Kind) {
         self.mend();
         let from = self.time.now + 1;
-        self.spoiler = Spoiler::new(Some(Injection { kind, at_s: self.time.seconds(from) }));
+        self.spoiler = Spoiler::new(
+            Some(Injection { kind, at_s: self.time.seconds(from) }),
+            self.plant.motors[0].largest_a,
+        );
         self.observed = Observed::new(from, Limits::NONE);
     }
 
     /// Mends the injected fault; what the drive has latched stays latched.
     pub fn mend(&mut self) {
-        self.spoiler = Spoiler::new(None);
+        self.spoiler = Spoiler::new(None, self.plant.motors[0].largest_a);
         self.observed = Observed::new(Tick::MAX, Limits::NONE);
         self.plant.source = Source::Bidirectional;
         self.plant.mend_network();

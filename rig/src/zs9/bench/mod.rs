@@ -80,6 +80,7 @@ impl Bench {
     pub fn new(plant: Zs9Plant, mut operator: Box<dyn Operator + Send>, settings: BenchSettings) -> Self {
         let time = Timeline::new(settings.drive.clock, COMPARE_STEPS, settings.lead_s);
         let speeds = plant.motors.each_ref().map(|motor| motor.speed_rpm());
+        let largest_a = plant.motors[0].largest_a;
         let fault_s = settings.injection.map(|injection| settings.lead_s + injection.at_s);
         Self {
             orders: operator.orders(-settings.lead_s, speeds),
@@ -88,7 +89,7 @@ impl Bench {
             plant,
             operator,
             converter: Converter::new(settings.flaws),
-            spoiler: Spoiler::new(settings.injection),
+            spoiler: Spoiler::new(settings.injection, largest_a),
             course: Course::default(),
             begun: 0,
             period: time.of_ticks(settings.drive.carrier_ticks),

@@ -9,8 +9,8 @@ use tractive::ports::{DualDriveCommand, DualReport, DualSample, HardwareBreak, P
 use tractive::thermal::Ratios;
 use tractive::time::Instant;
 
-/// The error of a current's reading up to which it counts as making no difference, in A: a tenth of a machine's largest current.
-const MUCH_A: f32 = 8.49;
+/// The error of a current's reading up to which it counts as making no difference, over a machine's largest current.
+const MUCH: f64 = 0.1;
 
 impl Bench {
     /// The conversions that the control timer triggered at `instant`, and what the bench commands.
@@ -60,7 +60,7 @@ impl Bench {
             (read.a - told.a).abs().max((read.b - told.b).abs()).max((read.c - told.c).abs())
         };
         let most_a = read_a.into_iter().zip(true_a).map(off).fold(0.0, f32::max);
-        if most_a > MUCH_A {
+        if f64::from(most_a) > MUCH * self.plant.motors[0].largest_a {
             self.observed.makes_a_difference(self.time.now);
         }
     }
