@@ -32,6 +32,18 @@ fn loops_are_designed_for_the_control_period_and_for_two_motors_in_turn() {
     assert_eq!(limits.duty_max, 0.3);
 }
 
+/// A line filter is damped by twice the conductance that both motors' 25.14 kW are at 400 V.
+#[test]
+fn a_source_behind_a_line_filter_is_damped() {
+    let settings = Settings::new(CLOCK, 2_500, &BUILT_IN);
+    assert_eq!(settings.link.damping_s, 0.0);
+    let damped = settings.behind_line_filter(true, &BUILT_IN);
+    assert!((damped.link.damping_s - 2.0 * 25.14e3 / 160e3).abs() < 1e-6, "{}", damped.link.damping_s);
+    assert_eq!(ZSourceDesign { damping_s: 0.0, ..damped.link }, settings.link);
+    assert_eq!(damped.behind_line_filter(false, &BUILT_IN).link, settings.link);
+    assert_eq!(damped.check(&BUILT_IN), Ok(()));
+}
+
 #[test]
 fn another_control_period_is_that_of_every_loop() {
     let settings = Settings::new(Clock::new(25_000_000, 5_000), 2_500, &BUILT_IN);

@@ -103,6 +103,20 @@ fn both_zeros_of_the_zs9_are_calibrated() {
     }
 }
 
+/// A torque that the signals of a small machine cannot carry is refused with its line, before anything is written.
+#[test]
+fn what_a_signal_cannot_carry_is_refused_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let (script, out) = (folder.path().join("much.talk"), folder.path().join("out"));
+    std::fs::write(&script, "enable\ntorque 400\n0.1 end\n").unwrap();
+    let mut talk = rig();
+    let output = talk.arg(&script).args(["--machine", "pmsm-48v-1kw", "--out"]).arg(&out).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("line 2: torque 400: ") && said.contains("30 N·m"), "{said}");
+    assert!(!out.exists());
+}
+
 /// Behind a line filter the contactors are open at first: the link's voltage is that of an empty network, and precharging it draws a current out of the line.
 #[test]
 fn the_zs9_is_precharged_through_a_line_filter() {

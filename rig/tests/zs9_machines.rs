@@ -53,6 +53,30 @@ fn verdicts(outcome: &Outcome) -> &[Value] {
     outcome.figures.get("verdicts").and_then(Value::as_array).unwrap()
 }
 
+/// Faults are in the machine's own units, and a line filter is damped, whatever the source and the currents are.
+#[test]
+fn faults_and_filters_are_those_of_the_machine() {
+    let place = tempfile::tempdir().unwrap();
+    let battery = machine(place.path(), "battery", BATTERY);
+    let strong = machine(place.path(), "three", THREE);
+    for folder in [&battery, &strong] {
+        for (name, fault) in [
+            ("source-low", "source_undervoltage"),
+            ("source-high", "capacitor_overvoltage"),
+            ("overcurrent", "overcurrent"),
+        ] {
+            let outcome = on(&format!("zs9-load-step --inject {name}@0.3"), folder);
+            let tripped = outcome.recording.trip().map(|trip| trip.fault.name());
+            assert_eq!(tripped, Some(fault), "{name}");
+        }
+    }
+    for (folder, line) in [(&battery, "0.02,10,2"), (&strong, "3,4,30"), (&strong, "8,8,10")] {
+        let outcome = on(&format!("zs9-load-step --line {line}"), folder);
+        assert!(outcome.recording.trip().is_none(), "{line}: {:?}", outcome.recording.trip());
+        assert!(figure(&outcome, "source_swing_percent") < 0.1, "{line}");
+    }
+}
+
 /// Every scenario asks shares of the machine's own ratings, and judges them.
 #[test]
 fn every_machine_is_asked_its_own_shares() {

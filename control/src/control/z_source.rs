@@ -389,6 +389,31 @@ mod tests {
         assert_eq!((above.duty, above.limited), (0.0, Limited::Below));
     }
 
+    /// A source that has risen by 4 V: the inductors are asked for the charge of both capacitors, and for that of the reference's shift.
+    #[test]
+    fn a_swing_of_the_source_charges_the_capacitors() {
+        let risen = ZSourceInput { source_v: 404.0, ..STEADY };
+        let asked_a = |damping_s| {
+            let (mut state, design) = (ZSource::new(), ZSourceDesign { damping_s, ..DESIGN });
+            state.step(&STEADY, &design, &GAINS).unwrap();
+            assert_eq!(
+                (state.damper.moved_v, state.damper.moves_v_s),
+                (0.0, 0.0),
+                "it begins where the source is"
+            );
+            let asked = state.step(&risen, &design, &GAINS).unwrap().inductor_ref_a;
+            (asked, state.damper)
+        };
+        let ((still_a, none), (damped_a, damper)) = (asked_a(0.0), asked_a(0.3));
+        assert_eq!((none.moved_v, none.moves_v_s), (0.0, 0.0));
+        let ratio = 667.0 / 404.0;
+        let charging_a = ratio * (DESIGN.capacitance_f * damper.moves_v_s + GAINS.outer_s * damper.moved_v);
+        assert!(
+            charging_a > 0.5 && ((damped_a - still_a) / charging_a - 1.0).abs() < 0.05,
+            "{still_a} {damped_a}"
+        );
+    }
+
     #[test]
     fn no_room_is_no_duty() {
         for duty_room in [0.0, -1.0] {

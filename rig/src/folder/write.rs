@@ -40,6 +40,9 @@ pub fn folder(out: &Path, contents: &Contents) -> Result<()> {
                 ("weakening.flux_knee_wb", false) => {
                     "; are inductances in H, flux linkages in Wb? The link has a hundredth of their voltage"
                 }
+                ("ratings.max_acceleration_rad_s2", false) => {
+                    "; the rotor's inertia (`--inertia`) is too small for its torque"
+                }
                 _ => "",
             };
             anyhow::anyhow!("the drive refuses the tables of these values: {refused}{why}")

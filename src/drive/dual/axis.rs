@@ -362,6 +362,29 @@ mod tests {
         assert_eq!(astray_rad(20_000.0), 1.0);
     }
 
+    /// The zero is calibrated if that is wanted, without torque, and from a twentieth of the largest speed on: 42 rad/s.
+    #[test]
+    fn a_zero_is_calibrated_where_it_shows() {
+        let torque = |torque_nm| MotorDemand::Torque(Demand { torque_nm, slew_limited: true });
+        let most = BUILT_IN.ratings.max_speed_rad_s * BUILT_IN.ratings.pole_pairs;
+        let calibrating = |wanted, demand, share: f32| {
+            let mut axis = Axis::new(Controller::with_tracking(TRACKING_RAD_S));
+            axis.calibrating = true;
+            for period in 0..300 {
+                let turned_rad = share * most * SETTINGS.clock.control_s() * period as f32;
+                axis.track(Angle::within_half_turn(turned_rad), true, &SETTINGS, &BUILT_IN);
+            }
+            axis.calibrate(wanted, &demand, &BUILT_IN);
+            axis.calibrating
+        };
+        assert!(calibrating(true, torque(0.0), 0.06));
+        assert!(calibrating(true, torque(0.0), -0.06));
+        assert!(!calibrating(false, torque(0.0), 0.06));
+        assert!(!calibrating(true, torque(1.0), 0.06));
+        assert!(!calibrating(true, MotorDemand::Speed(0.0), 0.06));
+        assert!(!calibrating(true, torque(0.0), 0.04));
+    }
+
     /// A jump of the angle is reported with its size, but a trusted sensor may jump; after a lost angle the speed is known again only after a while.
     #[test]
     fn a_jump_of_the_angle_is_told_unless_it_is_trusted() {
