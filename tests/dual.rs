@@ -394,6 +394,35 @@ fn the_operator_is_told_once_a_slot_and_only_where_it_commands() {
     }
 }
 
+/// Both zeros are found in every slot in which the operator wants it while the gates pulse, and no longer.
+#[test]
+fn zeros_are_calibrated_in_every_slot_as_long_as_the_operator_wants_it() {
+    let mut drive = Drive::pulsing();
+    drive.fake.operated = true;
+    let wanted = |calibrate| DualDriveCommand {
+        enable: true,
+        link_ref_v: 667.0,
+        acknowledge: 0,
+        calibrate,
+        ..DualDriveCommand::NONE
+    };
+    drive.shared.operator.publish(wanted(true), drive.control.next_call());
+    drive.run(20);
+    assert_eq!(drive.fake.report.calibrating, [true; 2]);
+    let mut zeros = vec![drive.fake.report.angle_zeros];
+    for _ in 0..5 {
+        drive.run(10);
+        assert_eq!(drive.fake.report.trip, None);
+        zeros.push(drive.fake.report.angle_zeros);
+    }
+    assert!(zeros.windows(2).all(|pair| pair[0][0] != pair[1][0] && pair[0][1] != pair[1][1]), "{zeros:?}");
+    drive.shared.operator.publish(wanted(false), drive.control.next_call());
+    drive.run(20);
+    let ended = drive.fake.report.angle_zeros;
+    drive.run(20);
+    assert_eq!((drive.fake.report.calibrating, drive.fake.report.angle_zeros), ([false; 2], ended));
+}
+
 /// A generator of words, good enough to look everywhere.
 struct Dice(u64);
 

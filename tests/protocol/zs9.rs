@@ -3,6 +3,7 @@
 use super::Stream;
 use tractive::built_in::zs9::BUILT_IN;
 use tractive::drive::dual::Settings;
+use tractive::frames::Angle;
 use tractive::nine_switch::Scheme;
 use tractive::operator::{DualRequest, DualStatus, Levels, State, Switches, Wanted};
 use tractive::ports::DualReport;
@@ -101,8 +102,8 @@ fn the_zeros_are_calibrated_while_commands_come() {
     assert!(!calibrates(&mut session, &mut links, false));
     assert!(calibrates(&mut session, &mut links, true));
     assert!(session.listen(1, Some(&commands.frame(at_rest()))).levels.calibrate);
-    let silent = (0..2_000).find(|_| !session.listen(1, None::<Frame>).levels.calibrate);
-    assert!(silent.is_some(), "commands have stopped");
+    let silent_ms = (0..2_000).find(|_| !session.listen(1, None::<Frame>).levels.calibrate);
+    assert!(silent_ms.is_some_and(|ms| ms < 200), "commands have stopped: {silent_ms:?}");
 }
 
 #[test]
@@ -165,6 +166,8 @@ fn the_telemetry_says_what_is_measured() {
         duty: 0.2,
         scheme: Scheme::Zvo,
         speed_known: true,
+        angle_zeros: [Angle::DEG_90, Angle(0xE000_0000)],
+        calibrating: [false, true],
         ..DualReport::default()
     };
     let status = DualStatus {
@@ -177,7 +180,7 @@ fn the_telemetry_says_what_is_measured() {
         temperatures: None,
     };
     let (mut measured, mut told) = (Zs9Measured::default(), None);
-    for _ in 0..10 {
+    for _ in 0..100 {
         station.listen(1, None::<Frame>);
         let Some(frame) = station.tell(&status, Some(&report)) else { continue };
         let message = FROM_ZS9.into_iter().find(|message| message.id == frame.id).unwrap();
@@ -200,4 +203,7 @@ fn the_telemetry_says_what_is_measured() {
     assert!(near(first.current_a, 40.0, 0.1) && near(second.current_a, 12.5, 0.1));
     assert!(near(measured.link_v, 666.0, 0.1) && near(measured.capacitor_v, 533.0, 0.1));
     assert!(near(measured.duty_percent, 20.0, 0.02));
+    let [zero1, zero2] = measured.angle_zeros_deg;
+    assert!(near(zero1, 90.0, 0.02) && near(zero2, -45.0, 0.02), "{zero1:?} {zero2:?}");
+    assert_eq!(measured.calibrating, [false, true]);
 }

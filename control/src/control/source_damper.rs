@@ -68,7 +68,9 @@ mod tests {
         for (to_v, expected_v) in [(410.0, 42.4), (800.0, MOST_MOVED * 800.0)] {
             let (mut damper, mut largest_v) = (SourceDamper::at(400.0), 0.0_f32);
             for _ in 0..10_000 {
+                let before_v = damper.moved_v;
                 damper.step(to_v, CAPACITORS, 0.3, PERIOD_S);
+                assert!((damper.moves_v_s - (damper.moved_v - before_v) / PERIOD_S).abs() < 1e-3);
                 largest_v = largest_v.max(damper.moved_v);
             }
             assert!((largest_v / expected_v - 1.0).abs() < 0.01, "{largest_v} V");

@@ -362,7 +362,7 @@ mod tests {
         assert_eq!(astray_rad(20_000.0), 1.0);
     }
 
-    /// The zero is calibrated if that is wanted, without torque, and from a twentieth of the largest speed on: 42 rad/s.
+    /// The zero is calibrated if that is wanted, without torque, and from a twentieth of the largest speed on: 31 rad/s.
     #[test]
     fn a_zero_is_calibrated_where_it_shows() {
         let torque = |torque_nm| MotorDemand::Torque(Demand { torque_nm, slew_limited: true });

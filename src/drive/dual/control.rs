@@ -442,3 +442,58 @@ fn check_demand(demand: &MotorDemand) -> Option<FailedCheck> {
         MotorDemand::Speed(speed) => Some((Fault::NotFinite, *speed, f32::MAX)),
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::built_in::zs9::BUILT_IN;
+    use crate::control::WithoutTorque;
+    use crate::drive::dual::Settings;
+    use crate::frames::Dq;
+    use crate::time::Clock;
+
+    const SETTINGS: Settings = Settings::new(Clock::new(25_000_000, 2_500), 2_500, &BUILT_IN);
+
+    /// The correction of a sensor's zero is added to the angle that it measures; a lost sensor has none.
+    #[test]
+    fn a_correction_is_added_to_the_measured_angle() {
+        let mut task = ControlTask::new(&BUILT_IN, SETTINGS);
+        let rest = WithoutTorque {
+            unexplained_v: Dq { d: 20.0, q: 0.0 },
+            omega: 400.0,
+            max_omega: 840.0,
+            magnets_wb: 0.2,
+            length_s: 0.1,
+        };
+        task.axes[1].zero.learn(&rest);
+        let zero = task.axes[1].zero.angle();
+        assert!(zero.signed_radians() > 0.05, "{zero:?}");
+        let measured = Angle(0x4000_0000);
+        assert_eq!(task.follow::<0>(Some(measured), false), (measured, None));
+        assert_eq!(task.follow::<1>(Some(measured), false), (measured + zero, None));
+        assert_eq!(task.follow::<1>(None, false).0, Angle::ZERO);
+    }
+
+    /// Both zeros are calibrated while the gates pulse; a motor with a demand is left out.
+    #[test]
+    fn zeros_are_calibrated_while_the_gates_pulse() {
+        let demand =
+            |torque_nm| MotorDemand::Torque(crate::control::Demand { torque_nm, slew_limited: true });
+        for (calibrate, pulsing, second_nm, wanted) in [
+            (true, true, 0.0, [true, true]),
+            (true, true, 5.0, [true, false]),
+            (true, false, 0.0, [false, false]),
+            (false, true, 0.0, [false, false]),
+        ] {
+            let mut task = ControlTask::new(&BUILT_IN, SETTINGS);
+            for period in 0..300_u16 {
+                let angle = Angle::within_half_turn(0.005 * f32::from(period));
+                assert_eq!(task.follow::<0>(Some(angle), false).1, None);
+                assert_eq!(task.follow::<1>(Some(angle), false).1, None);
+            }
+            let demands = [demand(0.0), demand(second_nm)];
+            task.calibrate(&DualDriveCommand { calibrate, demands, ..DualDriveCommand::NONE }, pulsing);
+            assert_eq!(task.axes.each_ref().map(|axis| axis.calibrating), wanted, "{calibrate} {pulsing}");
+        }
+    }
+}

@@ -125,6 +125,7 @@ impl Zs9 {
             capacitor_v: self.plant.network.capacitor_v(),
             inductor_a: self.plant.network.inductor_a(),
             source_v: self.plant.source_v,
+            line_a: None,
             duty: if all_s > 0.0 { shorted_s / all_s } else { 0.0 },
             scheme: Scheme::ALL.into_iter().find(|scheme| scheme.name() == pattern).unwrap_or(Scheme::S),
             trip: trip(heard),
