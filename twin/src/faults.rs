@@ -35,7 +35,8 @@ const EMPTY: Frame = Frame { id: 0x102, length: 0, data: [0; 8] };
 const EMPTY_TIME: Time = 47 * 2 * MICROSECOND;
 /// The time for which the drive is observed afterwards, and where the fault comes in the start.
 const AFTER: Time = 300 * MILLISECOND;
-const AFTER_STARTING: Time = 90 * MILLISECOND;
+/// In the start, before the script charges.
+const AFTER_STARTING: Time = 80 * MILLISECOND;
 
 /// The time in which any start has come to its end.
 const STARTED: Time = 25 * MILLISECOND;
