@@ -86,7 +86,8 @@ impl ZSourceDesign {
         }
     }
 
-    /// Conductance that damps any line filter of 1 to 8 mH, 2 to 8 mF and 10 mΩ or more, in S.
+    /// Conductance of a line filter's damping, in S: a multiple of `2 P/U²`, that of both motors' full power. It damps every filter of 1 to 8 mH, 2 to 8 mF and
+    /// 10 mΩ or more in front of the paper's machines.
     pub const fn line_damping_s(network: &ZSourceNetwork, ratings: &Ratings) -> f32 {
         2.0 * ratings.max_power_w * CONDUCTANCE / (network.source_v * network.source_v)
     }

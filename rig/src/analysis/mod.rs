@@ -95,13 +95,17 @@ pub fn window(recording: &Recording, from_s: f64, to_s: f64) -> &[Row] {
 
 /// Half the peak-to-peak swing of the link in some rows, as a share of its voltage.
 pub fn link_swing(rows: &[Row]) -> f64 {
-    let links = || rows.iter().map(|row| row.udc_v);
-    let (low_v, high_v) = (links().fold(f64::INFINITY, f64::min), links().fold(0.0, f64::max));
+    swing(rows.iter().map(|row| row.udc_v))
+}
+
+/// Half the peak-to-peak swing of voltages, as a share of their middle.
+pub fn swing(voltages: impl Iterator<Item = f64> + Clone) -> f64 {
+    let (low_v, high_v) = (voltages.clone().fold(f64::INFINITY, f64::min), voltages.fold(0.0, f64::max));
     (high_v - low_v) / (high_v + low_v)
 }
 
 /// Largest swing of the link behind a line filter in steady state, as a share of its voltage.
-const MOST_LINK_SWING: f64 = 0.03;
+pub const MOST_LINK_SWING: f64 = 0.03;
 
 /// The verdict on the largest of some swings of the link, each as a share of its voltage, under the name of what is judged.
 pub fn swing_verdict(what: &str, swings: impl Iterator<Item = f64>) -> Verdict {

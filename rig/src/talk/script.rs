@@ -234,10 +234,11 @@ pub const COMMANDS: [Command; 25] = [
     ("end", |_| Ok(Action::End)),
 ];
 
-const TORQUE: [f64; 2] = [-3_000.0, 3_000.0];
-const SPEED: [f64; 2] = [-16_000.0, 16_000.0];
-/// Highest voltage that a signal carries, in V.
-const MOST_V: f64 = 6_500.0;
+/// Ranges of torques, in N·m, and of speeds, in r/min, in the usual steps.
+pub(super) const TORQUE: [f64; 2] = [-3_000.0, 3_000.0];
+pub(super) const SPEED: [f64; 2] = [-16_000.0, 16_000.0];
+/// Highest voltage that a signal carries, in V, likewise.
+pub(super) const MOST_V: f64 = 6_500.0;
 
 fn action(name: &str, words: &mut Words, system: System) -> Result<Action> {
     let own: &[Command] = if system == System::Zs9 { &ZS9_COMMANDS } else { &[] };

@@ -1,6 +1,6 @@
 //! The frames to the drive, slot by slot, and the damage done to them on the way.
 
-use super::script::{Action, Line};
+use super::script::{Action, Line, MOST_V, SPEED, TORQUE};
 use super::system::System;
 use anyhow::{Result, ensure};
 use std::collections::VecDeque;
@@ -133,15 +133,15 @@ impl Sender {
             }
             _ => true,
         };
-        let most = |usual: f32, quantity| usual * self.scales.worth(quantity);
+        let most = |usual: f64, quantity| usual as f32 * self.scales.worth(quantity);
         ensure!(
             fits,
             "line {}: {}: a value is beyond what its signal carries for this machine: {} N·m, {} r/min, {} V at most",
             line.number,
             line.text,
-            most(3_000.0, Quantity::Torque),
-            most(16_000.0, Quantity::Speed),
-            most(6_500.0, Quantity::Voltage)
+            most(TORQUE[1], Quantity::Torque),
+            most(SPEED[1], Quantity::Speed),
+            most(MOST_V, Quantity::Voltage)
         );
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Figures and plots from a recording of the ZS9.
 
 use super::trace::{Recording, Row};
-use crate::analysis::Figures;
+use crate::analysis::{self, Figures};
 use crate::report::{self, Page, Panel};
 use crate::rows::{between, mean};
 use crate::trace::Recorded;
@@ -60,10 +60,9 @@ pub fn common(recording: &Recording) -> Figures {
 /// Name of the swing of a source behind a line filter at the end of a run, in % of its voltage.
 pub const SOURCE_SWING: &str = "source_swing_percent";
 
-/// Swing of the source over some rows: half of it from crest to trough, as a share of its mean.
+/// Half the peak-to-peak swing of the source in some rows, as a share of its voltage.
 pub fn swing(rows: &[Row]) -> f64 {
-    let (high, low) = (largest(rows, |row| row.source_v), -largest(rows, |row| -row.source_v));
-    0.5 * (high - low) / mean(rows, |row| row.source_v)
+    analysis::swing(rows.iter().map(|row| row.source_v))
 }
 
 /// Voltage of the source and current out of the line; none without a line filter.

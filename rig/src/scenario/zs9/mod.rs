@@ -16,7 +16,7 @@ pub use steady::SPEEDS_RPM as STEADY_SPEEDS_RPM;
 
 use super::System;
 use super::traction::flaws::{Drops, RealInverter};
-use crate::analysis::Figures;
+use crate::analysis::{Figures, MOST_LINK_SWING};
 use crate::bench::Limits;
 use crate::inject::Injection;
 use crate::inject::zs9::Kind;
@@ -326,9 +326,6 @@ pub fn free(inertia_kg_m2: f64) -> [SpeedSource; 2] {
     [(); 2].map(|()| SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 })
 }
 
-/// Largest swing that a source behind a line filter may have at the end of a run, in % of its voltage.
-const MOST_SWING_PERCENT: f64 = 3.0;
-
 /// Figures of the link, whose voltage moves by design while the capacitors damp a line filter.
 const OF_THE_LINK: [&str; 2] = ["link_deviation_percent", "capacitor_overshoot_percent"];
 /// Frequency of the line's ripple, in Hz, from which on it does not make a filter swing: the six pulses of a rectifier on 50 Hz.
@@ -355,7 +352,7 @@ pub fn judge(
     let swings = options.own.inject.is_some()
         || options.udc_ripple.is_some_and(|ripple| ripple.frequency_hz < RECTIFIER_HZ);
     let swing = figures.number(figures::SOURCE_SWING).map(|percent| {
-        let at_most = if swings { f64::INFINITY } else { MOST_SWING_PERCENT };
+        let at_most = if swings { f64::INFINITY } else { 100.0 * MOST_LINK_SWING };
         Verdict::at_most("swing of the source that is left in %", percent, at_most)
     });
     bounds.iter().map(verdict).chain(swing).collect()
