@@ -195,7 +195,8 @@ fn images(setup: &mut Setup, check: impl Fn(&Path) -> Result<bool>) -> Result<bo
 }
 
 /// Power stages with other position sensors than an encoder that counts.
-const SENSORS: [&str; 2] = ["power_stage_absolute.toml", "power_stage_resolver.toml"];
+const SENSORS: [&str; 3] =
+    ["power_stage_absolute.toml", "power_stage_biss.toml", "power_stage_resolver.toml"];
 
 /// Checks the images of every board: both drives, with each position sensor, and the one that identifies.
 fn board_images(setup: &mut Setup) -> Result<bool> {

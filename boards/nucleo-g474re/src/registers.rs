@@ -38,6 +38,9 @@ pub struct Registers {
     pub adc5: pac::adc::Adc,
     pub adc12: pac::adccommon::AdcCommon,
     pub adc345: pac::adccommon::AdcCommon,
+    /// A BiSS encoder's frames.
+    pub dma1: pac::bdma::Dma,
+    pub dmamux1: pac::dmamux::Dmamux,
     /// An absolute encoder.
     pub spi1: pac::spi::Spi,
     /// The ZS9's gate feedback.
@@ -73,6 +76,8 @@ impl Registers {
         adc5: pac::ADC5,
         adc12: pac::ADC12_COMMON,
         adc345: pac::ADC345_COMMON,
+        dma1: pac::DMA1,
+        dmamux1: pac::DMAMUX1,
         spi1: pac::SPI1,
         spi3: pac::SPI3,
         comparators: [pac::COMP1, pac::COMP2, pac::COMP3, pac::COMP4, pac::COMP5, pac::COMP6, pac::COMP7],

@@ -17,9 +17,10 @@ use std::path::Path;
 
 const FILE: &str = "power_stage.toml";
 /// The stages as they are delivered, with one position sensor each; the last one is the ZS9's.
-const TEXTS: [&str; 4] = [
+const TEXTS: [&str; 5] = [
     include_str!("../power_stage.toml"),
     include_str!("../power_stage_absolute.toml"),
+    include_str!("../power_stage_biss.toml"),
     include_str!("../power_stage_resolver.toml"),
     include_str!("../power_stage_zs9.toml"),
 ];

@@ -26,6 +26,7 @@ pub struct Keys {
     pub discharge_s: f64,
     pub z_source: Option<ZSource>,
     pub absolute: Option<Absolute>,
+    pub biss: Option<Biss>,
     pub resolver: Option<Resolver>,
     pub thermal: Option<ThermalKeys>,
 }
@@ -36,6 +37,14 @@ pub struct Keys {
 pub struct Absolute {
     pub bits: u32,
     pub gray: bool,
+}
+
+/// An absolute encoder with BiSS-C in its place.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Biss {
+    pub bits: u32,
+    pub turns_bits: u32,
 }
 
 /// A resolver in its place.
@@ -60,6 +69,7 @@ pub struct ZSource {
 pub enum PositionSensor {
     Encoder,
     Absolute(Absolute),
+    Biss(Biss),
     Resolver(Resolver),
 }
 

@@ -103,6 +103,7 @@ pub fn zs9(file: &Path, text: &str, machine: &Machine) -> Result<String, InputEr
         ("the ZS9's board reads encoders that count", "the control of two motors takes everything as it is");
     for (key, given, problem) in [
         ("absolute", keys.absolute.is_some(), counts),
+        ("biss", keys.biss.is_some(), counts),
         ("resolver", keys.resolver.is_some(), counts),
         ("angle_late_us", keys.angle_late_us.is_some(), as_it_is),
         ("current_filter_us", keys.current_filter_us.is_some(), as_it_is),

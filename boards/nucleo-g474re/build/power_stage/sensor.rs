@@ -1,7 +1,7 @@
 //! The position sensor of the image.
 
 use super::super::rates;
-use super::keys::{Absolute, PositionSensor, Resolver};
+use super::keys::{Absolute, Biss, PositionSensor, Resolver};
 use super::stage::{Bound, HALF_CODES, Machine, Stage};
 use std::path::Path;
 use tractive_tablegen::InputError;
@@ -18,6 +18,11 @@ const LEVEL_US: f64 = 20.0;
 /// V at a converter's pin over half its range.
 const HALF_RANGE_V: f64 = 1.65;
 
+/// A period that has time for a frame.
+fn has_frames(control_hz: u32) -> Bound<'static> {
+    Bound("control_hz", f64::from(control_hz), 0.0, f64::from(ABSOLUTE_HZ), "a frame and a rest")
+}
+
 /// The type of the position sensor that a stage names, as Rust.
 ///
 /// # Errors
@@ -28,11 +33,23 @@ pub fn sensor(file: &Path, text: &str, machine: &Machine) -> Result<String, Inpu
     let kind = match stage.sensor()? {
         PositionSensor::Encoder => "Encoder".to_owned(),
         PositionSensor::Absolute(Absolute { bits, gray }) => {
-            stage.check(&[
-                Bound("bits", f64::from(bits), 8.0, 24.0, "of one turn"),
-                Bound("control_hz", f64::from(control_hz), 0.0, f64::from(ABSOLUTE_HZ), "a frame and a rest"),
-            ])?;
+            stage
+                .check(&[Bound("bits", f64::from(bits), 8.0, 24.0, "of one turn"), has_frames(control_hz)])?;
             format!("Absolute<{bits}, {gray}>")
+        }
+        PositionSensor::Biss(Biss { bits, turns_bits }) => {
+            stage.check(&[
+                Bound("bits", f64::from(bits), 8.0, 26.0, "of one turn"),
+                Bound(
+                    "turns_bits",
+                    f64::from(turns_bits),
+                    0.0,
+                    f64::from(32 - bits),
+                    "32 with those of one turn",
+                ),
+                has_frames(control_hz),
+            ])?;
+            format!("Biss<{bits}, {turns_bits}>")
         }
         PositionSensor::Resolver(Resolver { pole_pairs, amplitude_v, lag_us }) => {
             let period_us = 1e6 / f64::from(control_hz);

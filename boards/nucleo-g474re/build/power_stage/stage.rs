@@ -2,7 +2,7 @@
 
 use super::super::dead_time::DeadTime;
 use super::super::rates;
-use super::keys::{Absolute, Keys, PositionSensor};
+use super::keys::{Absolute, Biss, Keys, PositionSensor};
 use std::path::Path;
 use tractive::configuration::{LATEST_ANGLE_S, Refused};
 use tractive::machine::{Ratings, Tables};
@@ -53,13 +53,21 @@ pub struct Stage<'a> {
 impl<'a> Stage<'a> {
     /// The sensor that the file names: one, and counts for an encoder alone.
     pub fn sensor(&self) -> Result<PositionSensor, InputError> {
-        let Keys { encoder_counts, absolute, resolver, .. } = self.keys;
-        match (encoder_counts, absolute, resolver) {
-            (Some(_), None, None) => Ok(PositionSensor::Encoder),
-            (None, Some(absolute), None) => Ok(PositionSensor::Absolute(absolute)),
-            (None, None, Some(resolver)) => Ok(PositionSensor::Resolver(resolver)),
-            (None, None, None) => Err(self.refuse("encoder_counts", "is missing".to_owned())),
-            _ => Err(self.refuse("encoder_counts", "one of encoder_counts, absolute, resolver".to_owned())),
+        let Keys { encoder_counts, absolute, biss, resolver, .. } = self.keys;
+        let named = [
+            encoder_counts.map(|_| PositionSensor::Encoder),
+            absolute.map(PositionSensor::Absolute),
+            biss.map(PositionSensor::Biss),
+            resolver.map(PositionSensor::Resolver),
+        ];
+        let mut named = named.into_iter().flatten();
+        match (named.next(), named.next()) {
+            (Some(sensor), None) => Ok(sensor),
+            (None, _) => Err(self.refuse("encoder_counts", "is missing".to_owned())),
+            _ => {
+                let problem = "one of encoder_counts, absolute, biss, resolver".to_owned();
+                Err(self.refuse("encoder_counts", problem))
+            }
         }
     }
 
@@ -67,7 +75,9 @@ impl<'a> Stage<'a> {
     pub fn sensor_counts(&self) -> Result<u32, InputError> {
         Ok(match self.sensor()? {
             PositionSensor::Encoder => self.keys.encoder_counts.unwrap_or_default(),
-            PositionSensor::Absolute(Absolute { bits, .. }) => 1 << bits.min(24),
+            PositionSensor::Absolute(Absolute { bits, .. }) | PositionSensor::Biss(Biss { bits, .. }) => {
+                1 << bits.min(24)
+            }
             PositionSensor::Resolver(_) => 65_536,
         })
     }
@@ -76,7 +86,7 @@ impl<'a> Stage<'a> {
     pub fn sensor_age_s(&self, control_hz: u32) -> Result<f64, InputError> {
         let periods = match self.sensor()? {
             PositionSensor::Encoder => 0.0,
-            PositionSensor::Absolute(_) => 1.0,
+            PositionSensor::Absolute(_) | PositionSensor::Biss(_) => 1.0,
             PositionSensor::Resolver(_) => 0.5,
         };
         Ok(periods / f64::from(control_hz))

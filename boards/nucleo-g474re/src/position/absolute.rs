@@ -25,26 +25,33 @@ pub struct Absolute<const BITS: u32, const GRAY: bool> {
     zero: Angle,
 }
 
-impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
-    const PINS: &'static [Pin] = &[
-        pin(Port::B, 3, Function::Alternate(5), &["SPI1_SCK"], "absolute encoder, clock"),
-        pin(Port::B, 4, Function::Alternate(5), &["SPI1_MISO"], "absolute encoder, data"),
-    ];
+/// The pins of an absolute encoder, whatever it speaks.
+pub(super) const PINS: &[Pin] = &[
+    pin(Port::B, 3, Function::Alternate(5), &["SPI1_SCK"], "absolute encoder, clock"),
+    pin(Port::B, 4, Function::Alternate(5), &["SPI1_MISO"], "absolute encoder, data"),
+];
 
-    /// Master, two words of 16 bits a frame, clock high at rest, at 170 MHz / 128; bits are read at its falling edges.
+/// Makes SPI1 a master of words of 16 bits with a clock that rests high; bits are read at its falling edges.
+pub(super) fn configure(registers: &Registers, rate: vals::Br, wait: &mut dyn Wait) {
+    registers.rcc.apb2enr().modify(|w| w.set_spi1en(true));
+    wait.microseconds(1);
+    registers.spi1.cr2().write(|w| w.set_ds(vals::Ds::BITS16));
+    registers.spi1.cr1().write(|w| {
+        w.set_mstr(vals::Mstr::MASTER);
+        w.set_cpol(vals::Cpol::IDLE_HIGH);
+        w.set_cpha(vals::Cpha::FIRST_EDGE);
+        w.set_br(rate);
+        w.set_ssm(true);
+        w.set_ssi(true);
+        w.set_spe(true);
+    });
+}
+
+impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
+    const PINS: &'static [Pin] = PINS;
+
     fn prepare(registers: &Registers, _stage: &PowerStage, wait: &mut dyn Wait) -> Result<(), StartError> {
-        registers.rcc.apb2enr().modify(|w| w.set_spi1en(true));
-        wait.microseconds(1);
-        registers.spi1.cr2().write(|w| w.set_ds(vals::Ds::BITS16));
-        registers.spi1.cr1().write(|w| {
-            w.set_mstr(vals::Mstr::MASTER);
-            w.set_cpol(vals::Cpol::IDLE_HIGH);
-            w.set_cpha(vals::Cpha::FIRST_EDGE);
-            w.set_br(vals::Br::DIV128);
-            w.set_ssm(true);
-            w.set_ssi(true);
-            w.set_spe(true);
-        });
+        configure(registers, vals::Br::DIV128, wait);
         Ok(())
     }
 

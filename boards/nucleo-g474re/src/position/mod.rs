@@ -1,10 +1,12 @@
-//! The rotor's position: a trait, and three sensors.
+//! The rotor's position: a trait, and four sensors.
 
 mod absolute;
+mod biss;
 mod encoder;
 mod resolver;
 
 pub use absolute::{Absolute, decoded};
+pub use biss::{Biss, CHANNELS, FRAME, checksum, position};
 pub use encoder::{BY_TIM2, Encoder, TIM4_BY_TIM3};
 pub use resolver::Resolver;
 

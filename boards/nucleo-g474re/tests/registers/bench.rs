@@ -180,6 +180,8 @@ impl Bench {
             adc3: at_memory!(pac::adc::Adc),
             adc5: at_memory!(pac::adc::Adc),
             adc345: at_memory!(pac::adccommon::AdcCommon),
+            dma1: at_memory!(pac::bdma::Dma),
+            dmamux1: at_memory!(pac::dmamux::Dmamux),
             spi1: at_memory!(pac::spi::Spi),
             spi3: at_memory!(pac::spi::Spi),
             adc12: at_memory!(pac::adccommon::AdcCommon),

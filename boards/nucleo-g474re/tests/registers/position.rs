@@ -5,10 +5,15 @@ use crate::bench::write_input;
 use crate::devices;
 use nucleo_g474re::Control;
 use nucleo_g474re::built_in::traction::BUILT_IN;
-use nucleo_g474re::position::{Absolute, Position, PositionState, Resolver, decoded};
+use nucleo_g474re::position::{
+    Absolute, Biss, CHANNELS, FRAME, Position, PositionState, Resolver, checksum, decoded,
+};
 use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
 use nucleo_g474re::registers::Registers;
+use std::sync::atomic::Ordering;
 use stm32_metapac::adc::Adc;
+use stm32_metapac::bdma::vals::Dir;
+use stm32_metapac::metadata::METADATA;
 use stm32_metapac::spi::vals::{Br, Cpha, Cpol};
 use stm32_metapac::timer::vals::{Ocm, Sms};
 use tractive::frames::Angle;
@@ -62,6 +67,71 @@ fn an_absolute_angle_is_that_of_the_frame_before() {
         assert_eq!(sensor.angle(), None, "{word:#x}");
         receive(&registers, 0b1001_0110_0110_1000, true);
         assert!(sensor.angle().is_some());
+    }
+}
+
+/// The DMA has written this frame, or all but its last word.
+fn write_frame(registers: &Registers, frame: u64, complete: bool) {
+    for (word, shift) in FRAME.iter().zip([48, 32, 16, 0]) {
+        word.store((frame >> shift) as u16, Ordering::Relaxed);
+    }
+    registers.dma1.ch(CHANNELS[0].0).ndtr().write(|w| w.set_ndt(u16::from(!complete)));
+}
+
+#[test]
+fn a_biss_frame_is_fetched_by_dma_and_checked_by_its_sum() {
+    let (bench, mut sensor) = prepared::<Biss<18, 4>>();
+    let registers = bench.registers;
+    assert_eq!(<Biss<18, 4>>::PINS, Ssi::PINS);
+    assert!(registers.rcc.ahb1enr().read().dma1en() && registers.rcc.ahb1enr().read().dmamux1en());
+    let (control, words) = (registers.spi1.cr1().read(), registers.spi1.cr2().read());
+    assert_eq!((control.cpol(), control.cpha()), (Cpol::IDLE_HIGH, Cpha::FIRST_EDGE));
+    // 170 MHz / 64: 64 clocks are 24 µs.
+    assert_eq!(control.br(), Br::DIV64);
+    assert!(words.rxdmaen() && words.txdmaen());
+    assert_eq!(sensor.angle(), None, "nothing was asked for");
+    let (receives, sends) = (registers.dma1.ch(CHANNELS[0].0), registers.dma1.ch(CHANNELS[1].0));
+    for (channel, direction, walks) in
+        [(receives, Dir::FROM_PERIPHERAL, true), (sends, Dir::FROM_MEMORY, false)]
+    {
+        let control = channel.cr().read();
+        assert!(control.en(), "the next frame is under way");
+        assert_eq!((control.dir(), control.minc(), channel.ndtr().read().ndt()), (direction, walks, 4));
+        assert_eq!(channel.par().read(), registers.spi1.dr16().as_ptr() as usize as u32);
+    }
+    // Nine turns, and a sixteenth: of four pole pairs a quarter.
+    let data = (9 << 18 | 1 << 14) << 2 | 0b11_u64;
+    let body = 1 << 32 | data << 7 | u64::from(!checksum(data) & 0x3F) << 1;
+    let frame = 0b11 << 62 | body << 20;
+    for (frame, complete, known) in [
+        (frame, true, true),
+        (frame, true, true),
+        (frame ^ 1 << 40, true, true),
+        (frame, false, true),
+        (frame ^ 1 << 22, true, false),
+        (0, true, false),
+        (u64::MAX, true, false),
+        (frame, true, true),
+        (frame, false, false),
+    ] {
+        write_frame(&registers, frame, complete);
+        let angle = sensor.angle();
+        assert_eq!(angle.is_some(), known, "{frame:#x}, {complete}");
+        let turned = angle.map(|angle| angle - POWER_STAGE.encoder_zero);
+        assert!(turned.is_none_or(|turned| turned == Angle((1 << 30) + 4 * (1 << 13))), "{turned:?}");
+    }
+}
+
+#[test]
+fn the_chips_multiplexer_leads_spi1s_requests_to_the_channels() {
+    let spi1 = METADATA.peripherals.iter().find(|peripheral| peripheral.name == "SPI1").unwrap();
+    for ((channel, request), signal) in CHANNELS.into_iter().zip(["RX", "TX"]) {
+        let found = spi1.dma_channels.iter().find(|found| found.signal == signal).unwrap();
+        assert_eq!((found.dmamux, found.request), (Some("DMAMUX1"), Some(u32::from(request))));
+        // Channel 1 of DMA1 is the multiplexer's channel 0, and the block's number 0.
+        let own =
+            METADATA.dma_channels.iter().find(|own| own.name == format!("DMA1_CH{}", channel + 1)).unwrap();
+        assert_eq!((own.channel as usize, own.dmamux_channel), (channel, Some(own.channel)));
     }
 }
 
