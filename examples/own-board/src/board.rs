@@ -1,9 +1,9 @@
-//! The board: registers on one side, the library's ports on the other, two for the interrupts and one for the idle loop. The addresses are
-//! placeholders for your chip's.
+//! The board: registers on one side, the library's ports on the other, two for the interrupts and one for the idle loop. The registers and their
+//! addresses are those of no real chip. Replace them by your chip's, and keep what each of these functions does.
 
 use crate::machine::BUILT_IN;
 use tractive::frames::{Abc, Angle};
-use tractive::modulation::CarrierHalf;
+use tractive::modulation::{CarrierHalf, Mode};
 use tractive::operator::{Configuration, Feedback, OperatorPort, Request, Status};
 use tractive::ports::{ControlPort, PwmPort, Report, Sample};
 use tractive::protection::SafeState;
@@ -22,17 +22,40 @@ const VOLT_PER_CODE: f32 = 0.2;
 /// Counts per turn of the encoder, electrical.
 const COUNTS: u32 = 4_096;
 
-/// Data registers of the converters, the encoder's count, three compare registers, the gates' enable.
+/// Data registers of the converters and the encoder's count.
 const CONVERTERS: *const u32 = 0x4001_2000 as *const u32;
 const ENCODER: *const u32 = 0x4000_0824 as *const u32;
-const COMPARES: *mut u32 = 0x4001_0034 as *mut u32;
+/// Shadow registers, which take effect together when a half ends: its length, two compares for each leg (the upper device is on below the first one
+/// and from the second one on), and whether the legs are driven at all.
 const RELOAD: *mut u32 = 0x4001_002C as *mut u32;
+const COMPARES: *mut u32 = 0x4001_0034 as *mut u32;
+const DRIVEN: *mut u32 = 0x4001_004C as *mut u32;
+/// What the legs do instead, at once and until it is taken back: see [`Force`].
+const FORCE: *mut u32 = 0x4001_0044 as *mut u32;
+/// Flags of the timers' updates, and the control timer's count since its update.
 const STATUS: *mut u32 = 0x4001_0010 as *mut u32;
-const GATES: *mut u32 = 0x4001_0044 as *mut u32;
-const PEND: *mut u32 = 0xE000_E200 as *mut u32;
 const CONTROL_STATUS: *mut u32 = 0x4000_0010 as *mut u32;
-/// Levels of the operator's switches: enable, acknowledge.
+const CONTROL_COUNT: *const u32 = 0x4000_0024 as *const u32;
+/// The interrupt controller's pending bits.
+const PEND: *mut u32 = 0xE000_E200 as *mut u32;
+/// Levels of the operator's switches: enable, acknowledge; and of the gate drivers' common ready wire.
 const SWITCHES: *const u32 = 0x4002_0010 as *const u32;
+const READY: *const u32 = 0x4002_0014 as *const u32;
+/// A compare value that is never reached.
+const NEVER: u32 = u32::MAX;
+
+/// Values of [`FORCE`].
+#[derive(Clone, Copy)]
+enum Force {
+    /// The pulses.
+    Nothing = 0,
+    /// All gates off.
+    Off = 1,
+    /// The three lower devices on.
+    Lower = 2,
+    /// The three upper devices on.
+    Upper = 3,
+}
 
 fn read(register: *const u32) -> u32 {
     // SAFETY: one of the addresses above, which the chip maps to a register that may be read at any time.
@@ -53,14 +76,36 @@ fn currents_a(converter: usize) -> Abc {
     Abc { a: phase(0), b: phase(1), c: phase(2) }
 }
 
-/// Turns the gates off.
+/// Turns the gates off: for the start, panics, and exceptions that nobody expects.
 pub fn gates_off() {
-    write(GATES, 0);
+    write(FORCE, Force::Off as u32);
 }
 
-/// Sets up clocks, pins, converters and timers, in the order that your chip requires, with the gates off.
+/// The safe state at once. A short circuit remains one: gates off would let the machine charge the link through the diodes.
+fn enter(safe: SafeState) {
+    match safe {
+        SafeState::GatesOff if read(FORCE) <= Force::Off as u32 => gates_off(),
+        SafeState::GatesOff => {}
+        SafeState::ShortCircuit => write(FORCE, Force::Lower as u32),
+        SafeState::UpperShortCircuit => write(FORCE, Force::Upper as u32),
+    }
+}
+
+/// Completes an interrupt's stores before it returns: without it, Cortex-M4 cores may fetch a wrong vector (erratum 838869).
+pub fn complete_stores() {
+    cortex_m::asm::dsb();
+}
+
+/// Sets up clocks, pins, converters, break inputs and timers, in the order that your chip requires. The gates stay off until a half that pulses.
 pub fn start() {
     gates_off();
+    write(DRIVEN, 0);
+    write(FORCE, Force::Nothing as u32);
+}
+
+/// `true` while all gate drivers are ready.
+fn is_ready() -> bool {
+    read(READY) & 1 != 0
 }
 
 /// The board as both tasks and the operator see it.
@@ -71,6 +116,9 @@ impl ControlPort for Board {
         write(CONTROL_STATUS, 0);
         if revises {
             write(PEND, 1 << 25);
+            // It has run before anything else is done.
+            cortex_m::asm::dsb();
+            cortex_m::asm::isb();
         }
     }
 
@@ -79,18 +127,23 @@ impl ControlPort for Board {
         Sample {
             currents_a: currents_a(0),
             udc_v: read(CONVERTERS.wrapping_add(3)) as f32 * VOLT_PER_CODE,
-            angle: Some(Angle(count * (u32::MAX / COUNTS + 1))),
-            may_pulse: true,
+            // The middle of the count, not its beginning.
+            angle: Some(Angle((2 * count + 1) * (u32::MAX / COUNTS / 2 + 1))),
+            may_pulse: is_ready(),
             hardware: None,
         }
     }
 
-    fn enter(&mut self, _safe: SafeState, _now: Instant) {
-        gates_off();
+    fn enter(&mut self, safe: SafeState, _now: Instant) {
+        enter(safe);
     }
 
-    fn overrun_ticks(&mut self, _now: Instant, _deadline_ticks: u32) -> u32 {
-        0
+    fn overrun_ticks(&mut self, _now: Instant, deadline_ticks: u32) -> u32 {
+        let count = read(CONTROL_COUNT);
+        // The flag was taken back at the beginning: if it is set again, the period is over.
+        let is_over = read(CONTROL_STATUS) & 1 != 0;
+        let ticks = if is_over { CLOCK.control_ticks + count } else { count };
+        ticks.saturating_sub(deadline_ticks)
     }
 
     fn report(&mut self, _now: Instant, _report: impl FnOnce() -> Report) {}
@@ -109,13 +162,32 @@ impl PwmPort for Board {
 
     fn play(&mut self, _now: Instant, next: &CarrierHalf) {
         write(RELOAD, next.period_ticks);
-        for (leg, ticks) in next.compare_ticks.iter().enumerate() {
-            write(COMPARES.wrapping_add(leg), *ticks);
+        for (leg, (starts, ticks)) in next.start_levels.into_iter().zip(next.compare_ticks).enumerate() {
+            let toggle = if ticks < next.period_ticks { ticks } else { NEVER };
+            let compares = if starts { [toggle, NEVER] } else { [0, toggle] };
+            for (number, compare) in compares.into_iter().enumerate() {
+                write(COMPARES.wrapping_add(2 * leg + number), compare);
+            }
         }
+        write(DRIVEN, u32::from(next.mode != Mode::Off));
     }
 
-    fn enter(&mut self, _safe: SafeState, _now: Instant) {
-        gates_off();
+    fn is_late(&mut self) -> bool {
+        // The flag was taken back at the beginning: if it is set again, the half had ended before its successor was loaded.
+        let is_late = read(STATUS) & 1 != 0;
+        if is_late {
+            enter(SafeState::GatesOff);
+        }
+        is_late
+    }
+
+    fn enter(&mut self, safe: SafeState, _now: Instant) {
+        enter(safe);
+    }
+
+    fn leave(&mut self, _now: Instant) -> bool {
+        write(FORCE, Force::Nothing as u32);
+        is_ready()
     }
 }
 
@@ -124,7 +196,7 @@ impl OperatorPort for Board {
         let levels = read(SWITCHES);
         let (enable, acknowledge) = (levels & 1 != 0, levels & 2 != 0);
         let feedback = Feedback {
-            driver_ready: true,
+            driver_ready: is_ready(),
             enable_input: true,
             sensor_alive: true,
             position_known: true,

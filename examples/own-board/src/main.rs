@@ -1,8 +1,8 @@
 //! A firmware with a board of its own: the code that a user of the library writes. It consists of two interrupts, their vector table, a board that
 //! implements the ports, and the tables of the machine in `machine/`.
 //!
-//! The registers in [`board`] are those of an example: pulses go to three compare registers, samples come from the converters' data registers.
-//! Replace them by your chip's; everything else can stay.
+//! The registers in [`board`] are those of an example. What is left to you besides them: the order in which your chip is set up, the break inputs in
+//! hardware and their causes (`Sample::hardware`), and the commands, which here are two switches.
 #![no_std]
 #![no_main]
 
@@ -43,11 +43,8 @@ unsafe impl<T> Sync for Own<T> {}
 
 static CONTROL: Own<ControlTask<BuiltIn>> =
     Own(UnsafeCell::new(ControlTask::new(BuiltIn, SETTINGS, Instant(CLOCK.control_ticks))));
-static PWM: Own<PwmTask<BuiltIn>> = Own(UnsafeCell::new(PwmTask::new(
-    BuiltIn,
-    SETTINGS,
-    Instant(SETTINGS.devices.shortest_half_ticks),
-)));
+static PWM: Own<PwmTask<BuiltIn>> =
+    Own(UnsafeCell::new(PwmTask::new(BuiltIn, SETTINGS, Instant(SETTINGS.devices.shortest_half_ticks))));
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -65,6 +62,7 @@ extern "C" fn TIM2() {
     // SAFETY: only this interrupt uses it.
     let task = unsafe { &mut *CONTROL.0.get() };
     task.run(&mut Board, &SHARED);
+    board::complete_stores();
 }
 
 /// The PWM timer's interrupt, of high priority: at each carrier boundary, and when control asks for a revision.
@@ -73,12 +71,29 @@ extern "C" fn TIM1_UP() {
     // SAFETY: only this interrupt uses it.
     let task = unsafe { &mut *PWM.0.get() };
     task.run(&mut Board, &SHARED);
+    board::complete_stores();
 }
 
-#[panic_handler]
-fn panic(_info: &core::panic::PanicInfo) -> ! {
+/// The last resort: gates off, until a reset.
+fn die() -> ! {
     board::gates_off();
     loop {
         core::hint::spin_loop();
     }
+}
+
+#[panic_handler]
+fn panic(_info: &core::panic::PanicInfo) -> ! {
+    die()
+}
+
+#[cortex_m_rt::exception]
+unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+    die()
+}
+
+/// Interrupts and exceptions that nobody expects.
+#[cortex_m_rt::exception]
+unsafe fn DefaultHandler(_number: i16) -> ! {
+    die()
 }
