@@ -1,7 +1,7 @@
 //! The flight recorder: the last control periods, frozen by a fault.
 //!
 //! Every control period writes one [`Record`] into a ring in RAM, whatever the drive does. After a fault the ring takes an eighth of its length more
-//! and stops: the periods that led to the fault can then be read until the ring is released.
+//! and stops: the periods that led to the fault can then be read until the gates pulse again.
 
 #![forbid(unsafe_code)]
 

@@ -109,6 +109,11 @@ fn block(tag: u32, at: Instant, payload: &[u32]) -> Block {
     filled([tag, at.0].into_iter().chain(payload.iter().copied()))
 }
 
+/// A report's words with its last one, the sum of squares, as zero: the board's operator alone needs it, and a block has no room for it.
+fn without_squares([a, b, c, d, e, f, g, h, i, j, k, l, m, n]: [u32; 14]) -> [u32; 15] {
+    [a, b, c, d, e, f, g, h, i, j, k, l, m, n, 0]
+}
+
 /// A block that begins with these words; zeros after them.
 fn filled(words: impl IntoIterator<Item = u32>) -> Block {
     let mut block = [0; BLOCK_WORDS];
@@ -147,7 +152,7 @@ impl Request {
         Some(match tag {
             1 => Self::Hello,
             2 => Self::ControlSample(at),
-            3 => Self::ControlReport(at, Report::from_words(*payload.first_chunk()?)),
+            3 => Self::ControlReport(at, Report::from_words(without_squares(payload))),
             4 => Self::PwmSample(at),
             5 => Self::Play(at, half_from_words(*payload.first_chunk()?)),
             6 => Self::Enter(at, SafeState::from_code(first)),

@@ -232,13 +232,14 @@ type Spoil = fn(&mut DualSample, &mut DualDriveCommand);
 
 #[test]
 fn what_is_sampled_wrong_trips_by_name() {
-    let cases: [Case<Spoil>; 19] = [
+    let cases: [Case<Spoil>; 20] = [
         (|sample, _| sample.source_v = 200.0, Fault::SourceUndervoltage),
         (|sample, _| sample.source_v = f32::NAN, Fault::NotFinite),
         (|sample, _| sample.capacitor_v = 721.0, Fault::CapacitorOvervoltage),
         (|sample, _| sample.capacitor_v = f32::NAN, Fault::NotFinite),
         (|sample, _| sample.capacitor_v = f32::INFINITY, Fault::NotFinite),
         (|sample, _| sample.inductor_a = f32::NAN, Fault::NotFinite),
+        (|sample, _| sample.inductor_a = f32::NEG_INFINITY, Fault::NotFinite),
         (|sample, _| sample.currents_a[0].a = 150.0, Fault::Overcurrent),
         (|sample, _| sample.currents_a[1].c = -150.0, Fault::Overcurrent),
         (|sample, _| sample.currents_a[1].c += 12.0, Fault::PhaseSum),
@@ -263,6 +264,26 @@ fn what_is_sampled_wrong_trips_by_name() {
         drive.fake.spoil = spoil;
         let trip = drive.trips(fault);
         println!("{}: {} (limit {})", fault.name(), trip.value, trip.limit);
+    }
+}
+
+/// The voltages of capacitor and source that a duty cannot make of each other: a reading that is off, and one that is frozen while the duty goes on.
+#[test]
+fn voltages_of_the_link_that_cannot_be_are_found() {
+    let cases: [(Spoil, u32); 3] = [
+        (|sample, _| sample.source_v = 600.0, 100),
+        (|sample, _| sample.capacitor_v = 420.0, 400),
+        (|_, command| command.link_ref_v = 680.0, 3_000),
+    ];
+    for (spoil, periods) in cases {
+        let mut drive = Drive::pulsing();
+        drive.fake.spoil = spoil;
+        drive.run(periods);
+        assert!(drive.fake.report.trip.is_some());
+        drive.run(3);
+        let trip = drive.fake.report.trip.expect("a fault");
+        assert_eq!((trip.fault, drive.is_off()), (Fault::LinkImplausible, true));
+        assert!(trip.value < trip.limit, "{trip:?}");
     }
 }
 
@@ -323,7 +344,7 @@ fn each_stuck_gate_is_told() {
 fn a_short_pause_around_the_peak_is_seen_before_it_alone() {
     let mut drive = Drive::pulsing();
     drive.fake.late_steps = SETTINGS.half_steps() / 2;
-    drive.run(400);
+    drive.run(300);
     assert_eq!(drive.fake.report.trip, None);
     assert!(!drive.is_off());
 }

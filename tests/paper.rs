@@ -46,11 +46,12 @@ fn cells(line: &str) -> Vec<&str> {
 
 /// The item that a fault of the campaign is of, by the beginning of its name.
 fn item(fault: &str) -> &'static str {
-    const ITEMS: [(&str, &str); 17] = [
+    const ITEMS: [(&str, &str); 18] = [
         ("current-", "current sensor"),
         ("angle-", "angle sensor"),
         ("link-", "DC link and its line"),
         ("source-", "source of the ZS9"),
+        ("network-", "sensor of the ZS9's network"),
         ("capacitors-", "capacitors of the ZS9"),
         ("overspeed", "load"),
         ("leg-", "gates' feedback"),

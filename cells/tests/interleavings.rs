@@ -225,10 +225,10 @@ fn words_alone_are_torn() {
 fn a_ring_gives_only_what_is_frozen() {
     loom::model(|| {
         let ring = Arc::new(Ring::<Message, 2, 8>::new());
-        ring.record(Message::number(1), false);
+        ring.record(Message::number(1), false, false);
         let reader = Arc::clone(&ring);
         let thread = thread::spawn(move || [reader.read(0), reader.read(1)]);
-        ring.record(Message::number(2), true);
+        ring.record(Message::number(2), true, false);
         let expected = [Some(Message::number(1)), Some(Message::number(2))];
         for (read, expected) in thread.join().unwrap().into_iter().zip(expected) {
             assert!(read.is_none() || read == expected, "{read:?}");
@@ -242,12 +242,12 @@ fn a_ring_that_is_released_under_the_readers_hands_gives_nothing_torn() {
     loom::model(|| {
         let ring = Arc::new(Ring::<Message, 2, 8>::new());
         for n in 1..9 {
-            ring.record(Message::number(n), n == 8);
+            ring.record(Message::number(n), n == 8, false);
         }
         let reader = Arc::clone(&ring);
         let thread = thread::spawn(move || reader.read(0));
         ring.release();
-        ring.record(Message::number(9), true);
+        ring.record(Message::number(9), true, false);
         let read = thread.join().unwrap();
         assert!([None, Some(Message::number(1)), Some(Message::number(9))].contains(&read), "{read:?}");
     });

@@ -41,7 +41,7 @@ const common = machine => [
 ];
 const faults = (numbered, sensors) => [
   ["Current sensors", name => name.startsWith("current-")], ["Angle sensor", name => name.startsWith("angle-")],
-  [sensors, name => /^(link|source|capacitors)-/.test(name)], ["Gates and devices", name => /^([uvw][hml]-|leg-|shoot-)/.test(name)],
+  [sensors, name => /^(link|source|capacitors|network)-/.test(name)], ["Gates and devices", name => /^([uvw][hml]-|leg-|shoot-)/.test(name)],
   ["Interrupts and rotor", name => /^(control-late|commands-lost|demand-not-finite|overspeed)/.test(name)], ["Another machine", name => /^(flux|resistance)-/.test(name)],
 ];
 const SAMPLES = { name: "samples", group: "Scope", of: [["20", "20 kHz"], ["50", "50 kHz"]], first: "20", restart: true };

@@ -161,7 +161,7 @@ impl Driven for Traction {
         // Whole turns, so that means are those of the operating point.
         let turns = ((last.t_s - first.t_s) * f1_hz).floor().max(1.0);
         let rows = self.kept.iter().position(|row| last.t_s - row.t_s < turns / f1_hz).unwrap_or(0);
-        let ideal = bound::ideal(&self.kept[rows..], &self.options, &self.machine);
+        let ideal = bound::ideal(&self.kept[rows..], self.options.pulse_limits(&self.machine), &self.machine);
         ideal.filter(|ideal| ideal.current_a.len() <= MOST_SAMPLES).map_or(Vec::new(), |ideal| {
             let turned =
                 ideal.angle.last().zip(ideal.angle.first()).map_or(0.0, |(last, first)| last - first);

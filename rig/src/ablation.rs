@@ -19,7 +19,7 @@ impl Ablation {
     /// Every protection that the campaign tries.
     pub fn all() -> impl Iterator<Item = Self> {
         /// The rest is found by boards, which have their own benches.
-        const CHECKS: [Fault; 17] = [
+        const CHECKS: [Fault; 18] = [
             Fault::Overcurrent,
             Fault::DcOvervoltage,
             Fault::DcUndervoltage,
@@ -32,6 +32,7 @@ impl Ablation {
             Fault::SourceUndervoltage,
             Fault::CapacitorOvervoltage,
             Fault::DutyRange,
+            Fault::LinkImplausible,
             Fault::SensorLost1,
             Fault::SensorLost2,
             Fault::LegStuck,

@@ -44,17 +44,26 @@ pub struct Beside {
     pub ripple_peak_to_peak_excess_percent: f64,
 }
 
+/// The limits that a run sets to its pulses.
+#[derive(Clone, Copy, Debug)]
+pub struct PulseLimits {
+    /// Shortest pulse, in µs.
+    pub min_pulse_us: f64,
+    /// Rate of control, in Hz; `None`: the usual one.
+    pub control_hz: Option<u32>,
+}
+
 /// The bound for the operating point in a window of a recording.
 pub fn beside(
     recording: &Recording,
     window: (f64, f64),
-    options: &RunOptions,
+    limits: PulseLimits,
     machine: &Machine,
 ) -> Option<Beside> {
     let rows = analysis::window(recording, window.0, window.1);
     let last = rows.last()?;
     let measured = distortion::of_recording(recording, window, &machine.folder);
-    let bound = Distortion::of(&ideal(rows, options, machine)?);
+    let bound = Distortion::of(&ideal(rows, limits, machine)?);
     // For pulses without ripple, no ripple is no excess.
     let excess = |value: f64, bound: f64| if value == bound { 0.0 } else { (value / bound - 1.0) * 100.0 };
     Some(Beside {
@@ -108,7 +117,7 @@ pub fn verdicts(points: &[Beside], options: &RunOptions) -> [Verdict; 3] {
 }
 
 /// The ideal samples at the operating point of these rows.
-pub fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine) -> Option<Samples> {
+pub fn ideal(rows: &[crate::trace::Row], limits: PulseLimits, machine: &Machine) -> Option<Samples> {
     let last = rows.last()?;
     let map = SmoothMap::new(&machine.folder.map);
     // Backward rotation is forward rotation seen in a mirror.
@@ -123,8 +132,7 @@ pub fn ideal(rows: &[crate::trace::Row], options: &RunOptions, machine: &Machine
         current_a: (mean(&|row| row.id_a), mirror * mean(&|row| row.iq_a)),
         flux_wb: (mean(&|row| flux(row).psi_d_wb), mean(&|row| flux(row).psi_q_wb)),
     };
-    let mut samples =
-        at.samples(options.min_pulse_us(machine.folder.parameters.max_switching_hz), machine)?;
+    let mut samples = at.samples(limits.min_pulse_us, limits.control_hz, machine)?;
     samples.torque_nm.iter_mut().for_each(|torque_nm| *torque_nm *= mirror);
     Some(samples)
 }
@@ -144,8 +152,9 @@ pub struct Operation {
 }
 
 impl Operation {
-    /// The samples from the mode's own pulses, none of them shorter than this many µs; `None` if the mode has none for this voltage.
-    pub fn samples(&self, min_pulse_us: f64, machine: &Machine) -> Option<Samples> {
+    /// The samples from the mode's own pulses, none of them shorter than this many µs, with control at a rate in Hz or, without one, at that which goes
+    /// with the machine; `None` if the mode has none for this voltage.
+    pub fn samples(&self, min_pulse_us: f64, control_hz: Option<u32>, machine: &Machine) -> Option<Samples> {
         let parameters = &machine.folder.parameters;
         let map = SmoothMap::new(&machine.folder.map);
         let pole_pairs = f64::from(parameters.pole_pairs);
@@ -163,6 +172,7 @@ impl Operation {
             dead_time_us: 0.0,
             min_pulse_us,
             max_switching_hz: machine.tables.ratings.max_switching_hz,
+            control_hz,
         };
         let ripple = Ripple::of(&wanted)?;
         let voltage_angle = uq.atan2(ud);

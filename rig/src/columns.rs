@@ -2,13 +2,16 @@
 //! allowed.
 
 use anyhow::{Context, Result, anyhow};
+use csv::StringRecord;
 use std::path::Path;
 
 /// The wanted columns of a file, row by row.
 pub struct Columns<const N: usize> {
     file: String,
     names: [&'static str; N],
-    rows: Vec<(u64, [String; N])>,
+    places: [usize; N],
+    head: StringRecord,
+    rows: Vec<(u64, StringRecord)>,
 }
 
 /// One field, and its position.
@@ -40,19 +43,29 @@ impl<const N: usize> Columns<N> {
         for record in reader.records() {
             let record = record.map_err(|error| broken(&file, &error))?;
             let line = record.position().map_or(0, csv::Position::line);
-            rows.push((line, places.map(|place| record.get(place).unwrap_or("").to_owned())));
+            rows.push((line, record));
         }
-        Ok(Self { file, names, rows })
+        Ok(Self { file, names, places, head: headers, rows })
+    }
+
+    /// The head, with all of the file's columns.
+    pub const fn head(&self) -> &StringRecord {
+        &self.head
+    }
+
+    /// Each row with all of the file's columns.
+    pub fn records(&self) -> impl Iterator<Item = &StringRecord> {
+        self.rows.iter().map(|(_, record)| record)
     }
 
     /// Each row's fields in the order of the names given to [`Columns::read`].
     pub fn rows(&self) -> impl Iterator<Item = [Field<'_>; N]> {
-        self.rows.iter().map(|(line, fields)| {
+        self.rows.iter().map(|(line, record)| {
             core::array::from_fn(|k| Field {
                 file: &self.file,
                 line: *line,
                 column: self.names[k],
-                text: &fields[k],
+                text: record.get(self.places[k]).unwrap_or(""),
             })
         })
     }

@@ -68,7 +68,7 @@ enum Command {
         #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<OsString>,
     },
-    /// Operating points: IN.csv has torque_nm,speed_rpm,udc_v; OUT.csv adds id_a,iq_a,region.
+    /// Operating points: IN.csv has torque_nm,speed_rpm,udc_v; OUT.csv has all of its columns, and behind them id_a,iq_a,region.
     Points {
         /// Points wanted.
         input: PathBuf,

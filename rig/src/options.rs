@@ -181,6 +181,14 @@ pub fn within(ranges: &[(&str, f64, f64, f64)]) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Options by name, each with whether it is given, what it has no effect without, and whether that is there. The error names the first that goes alone.
+pub fn needs(pairs: &[(&str, bool, &str, bool)]) -> anyhow::Result<()> {
+    for (name, given, other, has_other) in pairs {
+        anyhow::ensure!(!given || *has_other, "{name} has no effect without {other}");
+    }
+    Ok(())
+}
+
 impl RunOptions {
     /// Shortest pulse, in µs, for devices of this highest switching frequency, in Hz.
     pub fn min_pulse_us(&self, max_switching_hz: f64) -> f64 {

@@ -10,7 +10,7 @@ use clap::builder::PossibleValuesParser;
 use std::path::Path;
 use tractive::frames::{Angle, six_step_v};
 use tractive::modulation::{Mode, Modulator, Reference, Schedule, SwitchLimits, index_limit};
-use tractive::time::Instant;
+use tractive::time::{Clock, Instant};
 
 /// The pattern to make.
 #[derive(Clone, Copy, Debug, clap::Args)]
@@ -39,6 +39,9 @@ pub struct Wanted {
     /// Highest switching frequency, in Hz.
     #[arg(skip)]
     pub max_switching_hz: f32,
+    /// Rate of control, in Hz; `None` for the one that goes with devices of that frequency.
+    #[arg(skip)]
+    pub control_hz: Option<u32>,
 }
 
 /// The names of the modes with pulses; `opp7` stands for the one of its branches that is used at the modulation index.
@@ -55,6 +58,11 @@ impl Wanted {
     pub fn with_mode(self, name: &str) -> Self {
         let index = self.voltage_v / (self.udc_v * core::f64::consts::FRAC_2_PI);
         Self { mode: Mode::named_at(name, index as f32).unwrap_or_default(), ..self }
+    }
+
+    /// The clock of the drive that makes the pattern.
+    fn clock(&self) -> Result<Clock> {
+        self.control_hz.map_or_else(|| run::usual_clock(self.max_switching_hz), |hz| Ok(run::clock(hz)))
     }
 }
 
@@ -77,7 +85,7 @@ pub fn edges(wanted: &Wanted) -> Result<Vec<LegEdge>> {
         wanted.max_switching_hz,
         &CLOCK,
     );
-    devices.check(&run::usual_clock(wanted.max_switching_hz)?).map_err(refused)?;
+    devices.check(&wanted.clock()?).map_err(refused)?;
     let rate = (wanted.f1_hz * tick_s * 4_294_967_296.0) as f32;
     let lowest_hz = LONGEST_S.recip();
     if !(lowest_hz..=HIGHEST_HZ).contains(&wanted.f1_hz) {

@@ -5,11 +5,13 @@ use crate::files;
 use crate::machine::Machine;
 use crate::shards::{self, Merged, Plan, Shard};
 use anyhow::{Context, Result};
+use csv::StringRecord;
 use rayon::prelude::*;
 use std::path::Path;
 use tractive::control::{OperatingPoint, VoltageLimit, flux_linkage, operating_point};
 
 const COLUMNS: [&str; 3] = ["torque_nm", "speed_rpm", "udc_v"];
+const FOUND: [&str; 3] = ["id_a", "iq_a", "region"];
 
 #[derive(Clone, Copy, Debug)]
 struct Wanted {
@@ -18,27 +20,33 @@ struct Wanted {
     udc_v: f64,
 }
 
+/// A file's points, and all of its columns except those that are found anew.
+struct Points {
+    head: Vec<String>,
+    rows: Vec<(Vec<String>, Wanted)>,
+}
+
 /// Ratio of current or voltage to its limit up to which that counts as kept: the effect of interpolation beyond the largest speed is smaller.
 const KEPT: f32 = 1.05;
 
 /// The name of a sweep in shards.
 pub const POINTS: &str = "points";
 
-/// Reads points, writes points with `id_a,iq_a,region`; for a shard only its own, into a folder.
+/// Reads points, writes them with all of their columns and `id_a,iq_a,region` behind these; for a shard only its own, into a folder.
 pub fn run(input: &Path, output: &Path, machine: &Machine, shard: Option<Shard>) -> Result<()> {
-    let wanted = read(input, machine)?;
-    let columns = format!("{},id_a,iq_a,region", COLUMNS.join(","));
+    let Points { head, rows } = read(input, machine)?;
+    let columns = shards::csv_row(&head.iter().map(String::as_str).chain(FOUND).collect::<Vec<_>>())?;
     if let Some(shard) = shard {
         let folder = format!("{:?} {:?}", machine.folder.parameters, machine.folder.map);
         let configuration = serde_json::json!({
             "machine": format!("{:016x}", shards::hash(folder.as_bytes())),
             "input": format!("{:016x}", shards::hash(&std::fs::read(input)?)),
         });
-        let plan = Plan::new(POINTS, configuration, wanted.len(), &columns)?;
-        let row = |run: usize| Ok(line(wanted.get(run).context("a point of that number")?, machine));
+        let plan = Plan::new(POINTS, configuration, rows.len(), &columns)?;
+        let row = |run: usize| line(rows.get(run).context("a point of that number")?, machine);
         return shards::run(&plan, shard, output, row);
     }
-    let lines: Vec<String> = wanted.par_iter().map(|point| line(point, machine) + "\n").collect();
+    let lines = rows.par_iter().map(|row| Ok(line(row, machine)? + "\n")).collect::<Result<Vec<_>>>()?;
     files::write_text(output, &format!("{columns}\n{}", lines.concat()))
 }
 
@@ -69,15 +77,21 @@ impl Wanted {
     }
 }
 
-fn line(point: &Wanted, machine: &Machine) -> String {
-    let Wanted { torque_nm, speed_rpm, udc_v } = *point;
-    let found = point.found(machine);
-    let region = found.region.name();
-    format!("{torque_nm},{speed_rpm},{udc_v},{},{},{region}", found.current.d, found.current.q)
+fn line((given, wanted): &(Vec<String>, Wanted), machine: &Machine) -> Result<String> {
+    let OperatingPoint { current, region, .. } = wanted.found(machine);
+    let found = [current.d.to_string(), current.q.to_string(), region.name().to_owned()];
+    shards::csv_row(&[given.as_slice(), &found].concat())
 }
 
-fn read(input: &Path, machine: &Machine) -> Result<Vec<Wanted>> {
+fn read(input: &Path, machine: &Machine) -> Result<Points> {
     let columns = Columns::read(input, COLUMNS)?;
+    // What an earlier run has found is found anew.
+    let stays: Vec<bool> = columns.head().iter().map(|name| !FOUND.contains(&name)).collect();
+    let kept = |record: &StringRecord| {
+        let fields = record.iter().zip(&stays).filter(|(_, stays)| **stays);
+        // A row is a line, whatever a further column holds.
+        fields.map(|(field, _)| field.replace(['\r', '\n'], " ")).collect::<Vec<_>>()
+    };
     let points = columns.rows().map(|[torque, speed, udc]| {
         let wanted = Wanted {
             torque_nm: torque.number("a finite number", |_| true)?,
@@ -91,5 +105,6 @@ fn read(input: &Path, machine: &Machine) -> Result<Vec<Wanted>> {
         );
         if wanted.is_kept(machine) { Ok(wanted) } else { Err(speed.wrong(&allowed)) }
     });
-    points.collect()
+    let rows = columns.records().map(kept).zip(points).map(|(given, wanted)| Ok((given, wanted?)));
+    Ok(Points { head: kept(columns.head()), rows: rows.collect::<Result<_>>()? })
 }

@@ -1,8 +1,8 @@
 //! The current's spectrum in steady state next to that of the bound.
 
+use crate::bound::PulseLimits;
 use crate::distortion::{self, Samples};
 use crate::machine::Machine;
-use crate::options::RunOptions;
 use crate::report::Page;
 use crate::trace::Recording;
 use crate::{analysis, bound};
@@ -25,7 +25,7 @@ pub fn draw(
     page: &mut Page,
     recording: &Recording,
     (title, window): (&str, (f64, f64)),
-    options: &RunOptions,
+    limits: PulseLimits,
     machine: &Machine,
 ) {
     let rows = analysis::window(recording, window.0, window.1);
@@ -37,7 +37,7 @@ pub fn draw(
     let highest_hz = HIGHEST * machine.folder.parameters.max_switching_hz;
     let measured = distortion::samples(recording, window, &machine.folder);
     let mut series = vec![("measured", lines(&measured, f1_hz, (0.0, highest_hz)))];
-    if let Some(ideal) = bound::ideal(rows, options, machine) {
+    if let Some(ideal) = bound::ideal(rows, limits, machine) {
         series.push(("bound", lines(&ideal, f1_hz, (BESIDE * highest_hz, highest_hz))));
     }
     let heading = format!("Spectrum of phase current u without its fundamental · {title}");

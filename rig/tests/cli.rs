@@ -153,6 +153,31 @@ fn an_endless_machine_is_refused() {
     }
 }
 
+/// An option that would change nothing is refused, and what it needs is named.
+#[test]
+fn options_that_go_alone_are_refused() {
+    for (line, needed) in [
+        ("sweep --mtpa-start zero", "--law pi"),
+        ("sweep --angle-late-known", "--angle-jitter-us"),
+        ("sweep --current-filter-known", "--adc-skew-us"),
+        ("sweep --iron-loss-known", "--iron-loss"),
+        ("sweep --device-drop-known", "--device-drop"),
+        ("sweep --angle-1f-phase-deg 20 --angle-2f-deg 1", "--angle-1f-deg"),
+        ("sweep --angle-2f-phase-deg 20 --angle-1f-deg 1", "--angle-2f-deg"),
+        ("sweep --friction 3", "a free rotor"),
+        ("sweep --iron-loss 100 --machine pmsm-48v-1kw", "loss_rated_w"),
+        ("sweep --ablate damping", "--line"),
+        ("zs9-steady --uncompensated", "--dead-time-us"),
+    ] {
+        let option = line.split(' ').nth(1).unwrap();
+        refused_in_one_line(&format!("run {line}"), &[option, "has no effect without", needed]);
+    }
+    // Of all flaws at once, a machine has those that it can have.
+    let folder = tempfile::tempdir().unwrap();
+    let line = format!("run steady --real --machine pmsm-48v-1kw --out {}", folder.path().display());
+    assert_ne!(rig(&line).status.code(), Some(2));
+}
+
 /// A flaw that cannot be is refused, and named.
 #[test]
 fn flaws_that_cannot_be_are_refused() {
@@ -182,7 +207,13 @@ fn options_that_do_nothing_are_refused() {
     refused_in_one_line("run zs9-load-step --inject source-short@1.3", &["--inject", "1.3 s", "1.2 s"]);
     refused_in_one_line(
         "run zs9-load-step --inject overcurrent@-0.1",
-        &["--inject", "-0.1 s", "from 0 to 1.2 s"],
+        &["--inject", "-0.1 s", "from 0 to 1.18 s"],
+    );
+    refused("run zs9-cycle --cruise 0.5", &["0.5", "--cruise", "from 0.7 to 3600"]);
+    // Too late to show.
+    refused_in_one_line(
+        "run zs9-load-step --inject overcurrent@1.2",
+        &["--inject", "1.18 s", "ends at 1.2 s"],
     );
     refused_in_one_line("run zs9-steady --min-pulse-us 3", &["--min-pulse-us", "ZS9"]);
     refused("run zs9-steady --seed -1", &["--seed", "must be a whole number from 0"]);
@@ -263,6 +294,9 @@ fn a_run_ends_with_a_headline_and_a_table_with_units() {
 fn the_zs9_refuses_flaws_out_of_range_too() {
     refused_in_one_line("run zs9-load-step --map-error -100", &["--map-error -100", "-90"]);
     refused_in_one_line("run zs9-load-step --udc-ripple 500@300", &["--udc-ripple 500", "400"]);
+    // More than shoot-through makes of the source.
+    refused_in_one_line("run zs9-load-step --uin 1020", &["--uin 1020", "400 V to 1000 V", "duty of 0.3"]);
+    refused_in_one_line("run zs9-load-step --udc 500 --uin 1201", &["--uin 1201", "500 V to 1200 V"]);
 }
 
 /// A window shorter than a turn of the field is taken as it is; it used to be lengthened into the time before.
@@ -335,6 +369,14 @@ fn points_come_back_with_their_regions() {
     let text = std::fs::read_to_string(&output).unwrap();
     let regions: Vec<_> = text.lines().skip(1).map(|line| line.rsplit(',').next().unwrap()).collect();
     assert_eq!(regions, ["mtpa", "fw", "limit", "fw"], "{text}");
+    // All columns stay, in their order and as they are written; what an earlier run has found is found anew.
+    std::fs::write(&input, "name,udc_v,region,speed_rpm,torque_nm\n\"a, b\",1500.0,old,1e3,1235\n").unwrap();
+    assert_eq!(rig(&line).status.code(), Some(0));
+    let kept = std::fs::read_to_string(&output).unwrap();
+    let (head, row) = kept.trim_end().split_once('\n').unwrap();
+    assert_eq!(head, "name,udc_v,speed_rpm,torque_nm,id_a,iq_a,region");
+    let found = text.lines().nth(1).unwrap().strip_prefix("1235,1000,1500").unwrap();
+    assert_eq!(row, format!("\"a, b\",1500.0,1e3,1235{found}"));
     std::fs::remove_file(&output).unwrap();
     for (bad, words) in [
         ("torque_nm,speed_rpm\n1,2\n", ["udc_v", ":1:"]),

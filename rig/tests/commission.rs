@@ -39,7 +39,8 @@ fn from_the_wiring_to_the_first_torque() {
     assert_eq!(code, 0, "{said}");
     let advice = record["step"][1]["advice"][0].as_str().unwrap();
     assert!(advice.contains("device_threshold_v: add about "), "{advice}");
-    assert!((found(&record, 1, "threshold_v") - 2.0).abs() < 0.2);
+    // From seed to seed it scatters by 0.4 V.
+    assert!((found(&record, 1, "threshold_v") - 2.0).abs() < 0.5);
     let names = ["wiring", "identification", "tables", "first torque"];
     assert_eq!(steps(&record), names.map(|name| (name.to_owned(), true)));
     assert!(record["finished"].as_bool().unwrap() && record["on"].as_str() == Some("host"));
@@ -52,6 +53,46 @@ fn from_the_wiring_to_the_first_torque() {
     let speed_rpm = found(&record, 3, "speed_reached_rpm");
     assert!((speed_rpm - 0.3 * asked_nm / 3.0 * 9.549).abs() < 0.05 * speed_rpm, "{speed_rpm}");
     assert!(place.path().join("found/flux_map.csv").is_file());
+}
+
+/// All flaws of a usual inverter, whose current sensors are off by up to a twenty-fifth of the largest current: the drive takes that off.
+#[test]
+fn a_real_inverter_is_commissioned() {
+    for (machine, inertia, largest_a) in [("pmasynrm-180kw", "3", 233.345), ("pmsm-48v-1kw", "3e-4", 30.0)] {
+        let place = tempfile::tempdir().unwrap();
+        let (code, said, record) = free(inertia, &format!("--real --machine {machine}"), place.path());
+        assert_eq!(code, 0, "{machine}: {said}");
+        assert!(found(&record, 0, "current_at_rest_a") > 0.02 * largest_a, "{said}");
+    }
+}
+
+/// Sensors that the drive refuses, at its own bound of a twentieth, 11.67 A, are refused with what to do, and those that it takes pass.
+#[test]
+fn an_offset_is_judged_as_the_drive_judges_it() {
+    let of = |share: f64| {
+        let place = tempfile::tempdir().unwrap();
+        // Percent of the converters' range.
+        let percent = 100.0 * share * 233.345 / 455.0;
+        commissioned(&format!("--current-offset={percent},-{percent},0 --until identification"), place.path())
+    };
+    let (code, said, _) = of(0.048);
+    assert_eq!(code, 0, "{said}");
+    let (code, said, record) = of(0.055);
+    assert_eq!((code, steps(&record)), (1, vec![("wiring".to_owned(), false)]), "{said}");
+    assert!(said.contains("must be from 0 to 11.667"), "{said}");
+    assert!(record["step"][0]["advice"][0].as_str().unwrap().contains("takes off by itself"), "{said}");
+}
+
+/// Noise that the experiment cannot take is told as noise, and nothing is said about wires.
+#[test]
+fn noise_is_told_as_noise() {
+    let place = tempfile::tempdir().unwrap();
+    let (code, said, record) = free("3", "--noise-a 2.1", place.path());
+    assert_eq!(code, 1, "{said}");
+    let last = record["step"].as_array().unwrap().last().unwrap();
+    assert!(last["advice"][0].as_str().unwrap().contains("scatter too much"), "{said}");
+    assert!(said.contains("current_noise") && !said.contains("exchange"), "{said}");
+    assert!(!place.path().join("found").exists());
 }
 
 /// A direct drive without its load, which a twentieth of its largest torque would take beyond its largest speed: it used to end in `overspeed`.

@@ -137,6 +137,65 @@ fn a_likely_mistake_of_units_is_named() {
     }
 }
 
+/// A unit that the head states is the one that the question doubts.
+#[test]
+fn the_unit_of_a_current_is_doubted_where_the_head_states_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, out) = (folder.path().join("map.csv"), folder.path().join("made"));
+    let with = |units: [&str; 2], scales: [f64; 2]| {
+        let both = axis(-22.0, 2.0, 23);
+        let head = format!("id [{}],iq [{}],psi_d,psi_q", units[0], units[1]);
+        map(&head, &both, &both, |id, iq| {
+            let (psi_d, psi_q) = truth(id, iq);
+            format!("{},{},{psi_d:.9},{psi_q:.9}", scales[0] * id, scales[1] * iq)
+        })
+    };
+    for (text, options, told) in [
+        (
+            with(["mA", "A"], [1.0, 1.0]),
+            "",
+            "along −d: are its currents in A, and not in mA as its head says?",
+        ),
+        (
+            with(["A", "mA"], [1.0, 1.0]),
+            "",
+            "along q: are its currents in A, and not in mA as its head says?",
+        ),
+        (
+            with(["mA", "A"], [1.0, 1.0]),
+            "--d-axis reluctance",
+            "along q: are its currents in A, and not in mA as its head says?",
+        ),
+        (with(["A", "A"], [1e-3, 1e-3]), "", "are its currents in kA, and not in A as its head says?"),
+        (with(["kA", "kA"], [1.0, 1.0]), "", "are its currents in A, and not in kA as its head says?"),
+        (with(["A", "A"], [1e3, 1e3]), "", "are its currents in mA, and not in A as its head says?"),
+        // There is no smaller unit to ask about.
+        (with(["mA", "mA"], [1e6, 1e6]), "", "goes to 22000 along −d"),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        let output = import(&file, options, &out);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}: {said}");
+        assert!(said.contains(told), "{told}: {said}");
+    }
+}
+
+/// An angle needs a map in polar coordinates.
+#[test]
+fn the_angles_axis_of_a_map_without_angles_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, out) = (folder.path().join("map.csv"), folder.path().join("made"));
+    std::fs::write(&file, plane(truth)).unwrap();
+    let output = import(&file, "--angle-from d", &out);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(
+        said.trim_end(),
+        "--angle-from d has no effect without currents given by magnitude and angle, as columns Is and gamma"
+    );
+    assert!(!out.exists());
+}
+
 /// A map's own torque reveals what its numbers do not: rms from peak, and other pole pairs.
 #[test]
 fn a_torque_beside_the_flux_linkages_is_held_against_them() {
@@ -163,6 +222,20 @@ fn a_torque_beside_the_flux_linkages_is_held_against_them() {
         ),
         (with(half, half, 1.0), "--rms", None),
         (with(half, 1.0, 1.0), "", Some("1.41 times")),
+        (
+            with(1.0, 1.0, -1.0),
+            "",
+            Some(
+                "−1.00 times that of its currents and flux linkages with 3 pole pairs: are its currents, or is its torque, counted as a generator's, or its q axis the other way round?",
+            ),
+        ),
+        (
+            with(half, half, -1.0),
+            "",
+            Some("the other way round; and are its currents and flux linkages rms (--rms)?"),
+        ),
+        // The same machine seen in a mirror, with the torque of the mirror.
+        (with(1.0, 1.0, -1.0), "--negate iq,psi_q", None),
         (
             with(1.0, 1.0, 1.0),
             "--flux-factor 1.25",

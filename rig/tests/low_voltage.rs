@@ -49,6 +49,32 @@ fn a_hub_motor_brakes_into_its_link_as_far_as_its_copper_leaves_it() {
     );
 }
 
+/// No power comes back to the line where copper takes more than the shaft gives: the use of its limit is not seen. It was a pass of −4.8 times the limit.
+#[test]
+fn a_hub_motor_whose_copper_takes_everything_shows_no_limit_of_power() {
+    let machine = made(
+        "--pole-pairs 15 --rs 0.2 --ld 1.8e-4 --lq 2e-4 --psi-f 0.0105 --max-current 35 --udc 24 --max-speed-rpm 400 --max-switching-hz 16000",
+    );
+    let chosen =
+        catalogue::of_traction(&format!("line-limits --machine {}", machine.path().display())).unwrap();
+    let machine = chosen.machine().unwrap();
+    let figures = chosen.figures(&chosen.drive(&machine).unwrap(), &machine);
+    let verdicts = figures.get("verdicts").and_then(|verdicts| verdicts.as_array()).unwrap();
+    let used: Vec<_> =
+        verdicts.iter().filter(|verdict| verdict["what"] == "that limit over what is used of it").collect();
+    assert!(used.len() == 2 && used[1]["verdict"] == "not seen", "{used:?}");
+}
+
+/// At a third of its speed a hub motor's copper takes more than full braking gives: without a line it brakes by as much as its link can use. It used to
+/// empty the link.
+#[test]
+fn a_hub_motor_holds_its_link_while_the_line_is_away() {
+    keeps_its_bounds(
+        "--pole-pairs 15 --rs 0.1 --ld 2e-4 --lq 2.4e-4 --psi-f 0.012 --max-current 30 --udc 36 --max-speed-rpm 500 --max-switching-hz 16000",
+        &[("gaps", 11)],
+    );
+}
+
 /// A gearless motor whose EMF at its largest speed is a fiftieth of what the link gives: it never needs field weakening, and is a machine like any other.
 #[test]
 fn a_machine_that_never_weakens_keeps_its_bounds() {
@@ -165,6 +191,31 @@ fn a_weakened_machine_leaves_its_free_carrier_by_a_locked_one() {
         let into_patterns = switches.iter().filter(|switch| switch["to"] == "mid7" || switch["to"] == "mid3");
         let excess: Vec<_> = into_patterns.map(|switch| switch["excess_percent"].as_f64().unwrap()).collect();
         assert!(excess.len() == 2 && excess.iter().all(|excess| excess < most_percent), "{values}: {excess:?} %");
+    });
+}
+
+/// Devices that are faster than the usual control, in runs with a rate of their own: the bound's pulses and those on the page are made at that rate. At
+/// the usual one, bounds were not seen, and once its run was over the page of `characteristic` was refused.
+#[test]
+fn a_run_at_its_own_rate_of_control_is_judged_and_drawn_at_it() {
+    let machine = made(
+        "--pole-pairs 7 --rs 0.02 --max-current 60 --udc 50 --max-speed-rpm 40000 --max-switching-hz 48000 --ld 8e-6 --lq 8e-6 --psi-f 6e-4",
+    );
+    let machine = machine.path().to_str().unwrap();
+    ["steady --speed 20000", "characteristic"].par_iter().for_each(|line| {
+        let out = tempfile::tempdir().unwrap();
+        let words = ["--control-hz", "48000", "--machine", machine, "--json", "--out"];
+        let output = Command::new(env!("CARGO_BIN_EXE_tractive-rig"))
+            .arg("run")
+            .args(line.split(' '))
+            .args(words)
+            .arg(out.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert_ne!(output.status.code(), Some(2), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(said.contains("over its bound") && !said.contains("not seen"), "{line}: {said}");
+        assert!(out.path().join("report.html").exists(), "{line}");
     });
 }
 

@@ -161,7 +161,7 @@ fn what_is_wrong_with_a_map_is_named_with_file_line_and_column() {
         (
             good.replace("id_a,", "id_ma,"),
             "",
-            "--max-current 20: must be at most 0.022: map.csv ends there along −d: are its currents in kA",
+            "--max-current 20: must be at most 0.022: map.csv ends there along −d: are its currents in A, and not in mA as its head says?",
         ),
     ] {
         std::fs::write(&file, text).unwrap();

@@ -219,3 +219,37 @@ fn the_rate_of_control_that_fast_devices_need_is_named() {
         assert!(said.contains(&format!("max_switching_hz 40000: {words}")), "{command}: {said}");
     }
 }
+
+/// A machine that its link never makes weaken is rated at its largest speed, and the folder says so.
+#[test]
+fn the_origin_of_the_rated_speed_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for (most_rpm, rated_rpm, origin) in [
+        ("3000", 3000.0, "chosen: max_speed_rpm, up to which nothing is weakened"),
+        ("6000", 4207.0, "chosen: a little above the speed where weakening begins"),
+        ("4100", 4100.0, "chosen: max_speed_rpm, a little above the speed where weakening begins"),
+    ] {
+        let out = folder.path().join(most_rpm);
+        let told = new(&with("--max-speed-rpm", most_rpm), &out);
+        assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
+        let toml = std::fs::read_to_string(out.join("machine.toml")).unwrap();
+        let line = toml.lines().find(|line| line.starts_with("rated_speed_rpm")).unwrap();
+        assert!(line.ends_with(&format!("# {origin}")), "{line}");
+        let found = Machine::load(out.to_str().unwrap()).unwrap().folder.parameters.rated_speed_rpm;
+        assert!((found / rated_rpm - 1.0).abs() < 1e-3, "{found} r/min");
+    }
+}
+
+/// Devices that are faster than the usual control make ripple, too, and its room is chosen at the rate that they want: it used to be left out.
+#[test]
+fn the_ripple_of_devices_faster_than_control_has_its_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("made");
+    let values = "--pole-pairs 7 --rs 0.02 --max-current 60 --udc 50 --max-speed-rpm 40000 --ld 2e-6 --lq 2e-6 --psi-f 6e-4 --max-switching-hz 48000";
+    let told = new(values, &out);
+    let said = String::from_utf8_lossy(&told.stdout);
+    assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
+    assert!(said.contains("with the ripple of 48000 Hz the current is up to"), "{said}");
+    let parameters = Machine::load(out.to_str().unwrap()).unwrap().folder.parameters;
+    assert!(parameters.trip_current_a > 1.4 * 60.0, "{} A", parameters.trip_current_a);
+}

@@ -66,7 +66,7 @@ fn the_drive_goes_up_and_down_its_ladder() {
     recording.write_trace(&path).unwrap();
     assert!(std::fs::read_to_string(&path).unwrap().contains(",mid5,"));
     let mut page = Page::new("modes", "no figure: a ladder of its own");
-    figures::draw(&mut page, &recording, &[], &machine);
+    figures::draw(&mut page, &recording, &[], None, &machine);
     switches::plots(&recording, &mut page, |_, _| None);
     let page = page.finish("", &Figures::default()).unwrap();
     for part in ["mid5: 5 pulses a turn", "mid7 → mid5", "mid5 → mid3", "\nmid5\n", "\nsquare\n"] {
@@ -85,6 +85,6 @@ fn the_campaign_counts_faults_in_it() {
         assert_eq!(outcome.mode, "mid5", "{outcome:?}");
         assert_ne!(outcome.verdict, Verdict::Uncaught, "{outcome:?}");
     }
-    let text = report::text(&outcomes);
+    let text = report::text(&outcomes, None);
     assert!(text.contains("\n| mid5 motoring"), "{text}");
 }

@@ -4,7 +4,7 @@
 use tractive_rig::analysis;
 use tractive_rig::optimised::measured;
 use tractive_rig::scenario::catalogue;
-use tractive_rig::trace::{Recorded as _, Recording};
+use tractive_rig::trace::{Recorded as _, Recording, Switch};
 
 /// Speed in r/min, torque in N·m, mode, and the largest distortion in percent and torque ripple in N·m.
 const POINTS: [(f64, f64, &str, f64, f64); 9] = [
@@ -109,4 +109,24 @@ fn steps_reversals_and_restarts_do_not_trip() {
     for line in ["full-step", "reversal", "restart", "link-steps", "mode-borders"] {
         drive(&format!("{line} --patterns optimal"));
     }
+}
+
+/// Modes that follow a demand up and down do not hunt; patterns with as many turn-ons used to count as switched back in either direction.
+#[test]
+fn a_demand_that_rises_and_falls_is_no_hunting() {
+    let chosen = catalogue::of_traction("mode-borders --patterns optimal").unwrap();
+    let machine = chosen.machine().unwrap();
+    let mut recording = chosen.drive(&machine).unwrap();
+    let hunts = |recording: &Recording| {
+        let verdicts = analysis::switch_verdicts(&[], recording, &chosen.options, &machine);
+        verdicts.into_iter().find(|verdict| verdict.what.starts_with("hunting")).unwrap().found
+    };
+    assert_eq!(hunts(&recording), Some(0.0));
+    // A pattern left and taken back while nothing changes is hunting, between neighbours as well.
+    let highest = recording.switches.iter().position(|switch| switch.to.name() == "opp7e").unwrap();
+    let [up, down] = [highest, highest + 1].map(|k| recording.switches[k]);
+    let at = |switch: &Switch, later_s: f64| Switch { t_s: up.t_s + later_s, ..*switch };
+    let pair = [at(&down, 0.4), at(&up, 0.5)];
+    recording.switches.splice(highest + 1..highest + 1, pair);
+    assert!(hunts(&recording) >= Some(1.0));
 }

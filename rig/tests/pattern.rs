@@ -24,6 +24,7 @@ impl Pattern {
             dead_time_us: 0.0,
             min_pulse_us: 0.0,
             max_switching_hz: 900.0,
+            control_hz: None,
         };
         Self { edges: edges(&wanted).unwrap(), f1_hz, cycles }
     }

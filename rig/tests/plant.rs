@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
-use tractive_rig::plant::{Leg, Plant, PlantSettings, SpeedSource};
+use tractive_rig::plant::{Leg, Plant, PlantSettings, SpeedSource, Stator};
 use tractive_tablegen::{MachineFolder, SmoothMap};
 
 const UDC_V: f64 = 1500.0;
@@ -119,6 +119,7 @@ fn steady_state_is_that_of_the_algebraic_equations() {
 
 #[test]
 fn the_short_circuit_settles_at_its_operating_point() {
+    let stator = Stator::new(&machine(), &PlantSettings::default());
     for speed_rpm in [3000.0, 6000.0, -6000.0] {
         let mut plant = plant_at(speed_rpm);
         for _ in 0..60_000 {
@@ -130,6 +131,27 @@ fn the_short_circuit_settles_at_its_operating_point() {
         assert!((0.1 * id - omega * flux.psi_q_wb).abs() < 0.01, "d axis at {speed_rpm}");
         assert!((0.1 * iq + omega * flux.psi_d_wb).abs() < 0.01, "q axis at {speed_rpm}");
         assert!((id.hypot(iq) - 193.0).abs() < 2.0, "{} A", id.hypot(iq));
+        let wanted = stator.short_circuit_a(omega);
+        assert!((id - wanted.0).hypot(iq - wanted.1) < 0.05, "{id}, {iq} A: {wanted:?}");
+    }
+}
+
+/// The torque of a linear machine's short circuit by its closed form, at speeds on both sides of its peak.
+#[test]
+fn the_short_circuit_of_a_linear_machine_is_that_of_its_equations() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tables/ipm-zs9");
+    let machine = MachineFolder::read(&folder).unwrap();
+    let stator = Stator::new(&machine, &PlantSettings::default());
+    let (at, parameters) = (SmoothMap::new(&machine.map).at(0.0, 0.0), &machine.parameters);
+    let (rs, ld, lq, psi) = (parameters.stator_resistance_ohm, at.ldd_h, at.lqq_h, at.psi_d_wb);
+    let pole_pairs = f64::from(parameters.pole_pairs);
+    for omega in [10.0, 100.0, rs / ld, 1e3, -1e3, 1e4] {
+        let square = rs * rs + omega * omega * ld * lq;
+        let (id, iq) = (-omega * omega * lq * psi / square, -omega * rs * psi / square);
+        let wanted_nm = 1.5 * pole_pairs * (psi * iq + (ld - lq) * id * iq);
+        let (found_d, found_q) = stator.short_circuit_a(omega);
+        let found_nm = stator.torque_nm(found_d, found_q);
+        assert!((found_nm / wanted_nm - 1.0).abs() < 1e-4, "{omega} rad/s: {found_nm} and {wanted_nm} N·m");
     }
 }
 

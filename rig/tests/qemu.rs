@@ -35,7 +35,7 @@ fn same(scenario: &str, code: i32) {
     if !scenario.starts_with("zs9-cycle") {
         files.push("edges.csv");
     }
-    if code == 1 && !scenario.starts_with("zs9-") || scenario == "acknowledge" {
+    if code == 1 && !scenario.starts_with("zs9-") {
         files.push("recorder.csv");
     }
     if ["precharge", "chopper", "acknowledge", "wheel"].contains(&scenario) {

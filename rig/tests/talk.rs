@@ -346,15 +346,38 @@ fn the_zs9_rejects_hostile_frames_and_silence_ends_it() {
 #[test]
 fn a_fault_stops_both_motors_and_is_acknowledged() {
     let out = tempfile::tempdir().unwrap();
-    let output = talk_zs9("zs9-fault.talk", out.path(), &["--inject", "gate-driver@2.6"]);
+    let injected = ["--inject", "gate-driver@2.6"];
+    let output = talk_zs9("zs9-fault.talk", out.path(), &injected);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let recorder = rows(&out.path().join("recorder.csv"));
+    let recorder = out.path().join("recorder.csv");
+    assert!(!recorder.exists(), "the gates pulse again, so the recorder waits for the next fault");
+    // The same up to the link that is charged again.
+    let script = std::fs::read_to_string(script("zs9-fault.talk")).unwrap();
+    let (charged, _) = script.split_once("      enable with-torque").unwrap();
+    let short = out.path().join("charged.talk");
+    std::fs::write(&short, format!("{charged}4.10  end\n")).unwrap();
+    let output = talk_zs9(short.to_str().unwrap(), out.path(), &injected);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let recorder = rows(&recorder);
     assert_eq!(recorder.len(), 256);
     let first = recorder.iter().position(|row| row["fault"] == "gate_driver").unwrap();
     assert_eq!(first, 224);
     let at_s: f64 = recorder[first]["t_s"].parse().unwrap();
     assert!((2.6..2.6002).contains(&at_s), "{at_s}");
     assert_eq!((recorder[first - 1]["pulsing"].as_str(), recorder[first]["pulsing"].as_str()), ("1", "0"));
+}
+
+/// The link is charged to the voltage of the source that the options name; it used to be the machine's nominal one.
+#[test]
+fn the_source_of_a_talk_is_that_of_the_options() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = folder.path().join("charge.talk");
+    std::fs::write(&script, "0.3 charge\n3.0 expect link_v 1300 within 20\nend\n").unwrap();
+    for (udc_v, wanted) in [("1300", 0), ("1500", 1)] {
+        let mut talk = rig();
+        talk.arg(&script).args(["--udc", udc_v, "--out"]).arg(folder.path().join("out"));
+        assert_eq!(talk.output().unwrap().status.code(), Some(wanted), "{udc_v}");
+    }
 }
 
 #[test]

@@ -148,7 +148,7 @@ fn refused(line: &str, words: &[&str]) {
 /// A load that the machine cannot carry, and machines that the drive cannot have, are refused by the user's own option or key.
 #[test]
 fn what_the_zs9_cannot_have_is_refused_by_the_users_own_key() {
-    refused("run zs9-load-step --step 100", &["--step 100", "-180 to 60"]);
+    refused("run zs9-load-step --step 60", &["--step 60", "-174 to 54"]);
     refused("run zs9-steady --machine pmasynrm-180kw", &["dc_link_max_v 1800", "1515", "zs9_source_v 2205"]);
     let place = tempfile::tempdir().unwrap();
     let feather = machine(place.path(), "feather", &THREE.replace("--inertia 0.1", "--inertia 0.001"));
@@ -156,6 +156,70 @@ fn what_the_zs9_cannot_have_is_refused_by_the_users_own_key() {
     refused(&line, &["rotor_inertia_kg_m2 0.001", "at least 0.0019", "250000 rad/s²"]);
     let output = rig(&line);
     assert!(!String::from_utf8_lossy(&output.stderr).contains("--control-hz"), "the ZS9 has none");
+}
+
+/// A rotor so heavy that its speed loop takes a second is given the time: motor 1's torque used to move because it was still settling.
+#[test]
+fn a_heavy_rotor_settles_before_its_neighbour_s_load_steps() {
+    let place = tempfile::tempdir().unwrap();
+    let heavy = machine(place.path(), "heavy", &THREE.replace("--inertia 0.1", "--inertia 140"));
+    let outcome = on("zs9-load-step", &heavy);
+    assert!(
+        verdicts(&outcome).iter().all(|verdict| verdict["verdict"] == "pass"),
+        "{:#?}",
+        verdicts(&outcome)
+    );
+}
+
+/// A large step of the load that the machine recovers from; each row says why it is not judged.
+#[test]
+fn steps_that_the_machine_carries_end_well() {
+    for step in ["54", "-174"] {
+        let outcome = run(&format!("zs9-load-step --step {step}"));
+        assert!(outcome.recording.trip().is_none() && !outcome.figures.fall_short(), "{step}");
+        for verdict in verdicts(&outcome) {
+            assert_eq!(verdict["verdict"], "reported", "{step}");
+            assert!(verdict["what"].as_str().unwrap().ends_with("not judged for steps beyond 40.0 N·m"));
+        }
+    }
+}
+
+/// Keys that a file allows by themselves, and the ZS9 does not, are refused with their file and line, and under their own name.
+#[test]
+fn keys_of_the_zs9_are_refused_by_their_place() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = machine(place.path(), "three", THREE);
+    let text = std::fs::read_to_string(folder.join("machine.toml")).unwrap();
+    for (keys, words) in [
+        (&[("zs9_link_v", "5000")][..], &["zs9_link_v 5000", "400 V to 1000 V"][..]),
+        (&[("trip_dc_under_v", "0.0")], &["trip_dc_under_v 0", "above 0"]),
+        (&[("zs9_inductance_h", "0.2")], &["zs9_inductance_h: 0.2", "up to 0.1"]),
+        (&[("zs9_capacitance_f", "0.2")], &["zs9_capacitance_f: 0.2", "up to 0.1"]),
+        (&[("zs9_resistance_ohm", "1.1")], &["zs9_resistance_ohm: 1.1", "from 0 to 1"]),
+        // The plant would never come to an end.
+        (&[("zs9_inductance_h", "1e-9")], &["zs9_inductance_h 1e-9", "at least 1.6e-9 H·F"]),
+        (
+            &[("zs9_inductance_h", "5e-6"), ("zs9_resistance_ohm", "0.9")],
+            &["zs9_resistance_ohm 0.9", "0.125"],
+        ),
+    ] {
+        std::fs::write(folder.join("machine.toml"), &text).unwrap();
+        rewrite(&folder, keys);
+        let line = format!("run zs9-load-step --machine {}", folder.display());
+        let file = format!("{}/machine.toml:", folder.display());
+        refused(&line, &[words, &[file.as_str()]].concat());
+    }
+    // A default that is out of the range has no line.
+    let weak = machine(
+        place.path(),
+        "weak",
+        &BATTERY
+            .replace("--max-current 25", "--max-current 6000")
+            .replace("--rs 0.03", "--rs 0.0005")
+            .replace("--inertia 0.0002", "--inertia 10"),
+    );
+    let line = format!("run zs9-load-step --machine {}", weak.display());
+    refused(&line, &["weak/machine.toml: zs9_capacitance_f", "to 0.1 in the ZS9"]);
 }
 
 /// The network is the folder's, the plant's and the drive's alike: link and capacitors stay within their bounds.

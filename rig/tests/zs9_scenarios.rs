@@ -248,11 +248,33 @@ fn every_fault_has_its_name_and_ends_with_all_gates_off() {
     }
 }
 
+/// A low source is low and a high one high, whatever its voltage was: 312 V of 500 were above the trip level, and the run a pass without a fault.
 #[test]
-fn a_link_that_asks_for_too_much_shoot_through_never_starts() {
-    let outcome = run("zs9-load-step --uin 1020");
-    assert_eq!(outcome.recording.trip().unwrap().fault.name(), "duty_range");
-    assert!(outcome.recording.edges.is_empty());
+fn a_source_that_fails_is_noticed_whatever_its_voltage() {
+    for (line, name) in [
+        ("source-low@0 --udc 500", "source_undervoltage"),
+        ("source-low@0.3 --udc 600 --uin 700", "source_undervoltage"),
+        ("source-high@0.3 --udc 300 --uin 500", "capacitor_overvoltage"),
+    ] {
+        let outcome = run(&format!("zs9-load-step --inject {line}"));
+        assert_eq!(outcome.recording.trip().map(|trip| trip.fault.name()), Some(name), "{line}");
+    }
+}
+
+/// A fault that was injected and that nobody latched is no pass.
+#[test]
+fn a_fault_without_effect_falls_short() {
+    let chosen = catalogue::of_zs9("zs9-load-step --inject overcurrent@0.3").unwrap();
+    let machine = chosen.machine().unwrap();
+    let judged = |recording: &Recording| {
+        let figures = chosen.figures(recording, &machine);
+        let verdicts = figures.get("verdicts").and_then(Value::as_array).unwrap().clone();
+        let no_effect = |verdict: &Value| verdict["what"] == "the injected fault had no effect";
+        verdicts.into_iter().find(no_effect).map(|verdict| verdict["verdict"].clone())
+    };
+    assert_eq!(judged(&chosen.drive(&machine).unwrap()), Some("pass".into()));
+    let healthy = run("zs9-load-step").recording;
+    assert_eq!(judged(&healthy), Some("falls short".into()));
 }
 
 #[test]

@@ -56,12 +56,16 @@ impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
         }
     }
 
-    /// Writer's side: the next value, with the flag of a latched fault.
+    /// Writer's side: the next value, with the flag of a latched fault. A ring that a fault has frozen takes none, unless it is to record `anew`.
     #[inline(always)]
-    pub fn record(&self, value: T, faulty: bool) {
-        let after = self.after.load(Ordering::Relaxed);
+    pub fn record(&self, value: T, faulty: bool, anew: bool) {
+        let mut after = self.after.load(Ordering::Relaxed);
         if after == Self::AFTER as u32 {
-            return;
+            if !anew {
+                return;
+            }
+            self.release();
+            after = 0;
         }
         let written = self.written.load(Ordering::Relaxed);
         let Some(slot) = self.slots.get(written as usize % N) else { return };
@@ -73,6 +77,8 @@ impl<T: Words<W>, const W: usize, const N: usize> Ring<T, W, N> {
     }
 
     /// Writer's side: forgets the fault and the values before it, and records anew.
+    #[cold]
+    #[inline(never)]
     pub fn release(&self) {
         self.after.store(0, Ordering::Relaxed);
         self.forgotten.store(self.written.load(Ordering::Relaxed), Ordering::Relaxed);
@@ -133,7 +139,7 @@ mod tests {
             for n in 0..60 {
                 let open = n < faulty_at + 2;
                 assert_eq!(contents(&ring).is_empty(), open, "{n}");
-                ring.record(Number(n), n >= faulty_at);
+                ring.record(Number(n), n >= faulty_at, false);
             }
             let first = (faulty_at + 2).saturating_sub(16);
             assert_eq!(contents(&ring), (first..faulty_at + 2).collect::<Vec<_>>());
@@ -143,18 +149,30 @@ mod tests {
     #[test]
     fn a_released_ring_records_the_next_fault() {
         let ring = Ring::<Number, 1, 8>::new();
-        (0..20).for_each(|n| ring.record(Number(n), n > 10));
+        (0..20).for_each(|n| ring.record(Number(n), n > 10, false));
         ring.release();
         assert!(!ring.is_frozen() && ring.read(0).is_none());
-        (100..103).for_each(|n| ring.record(Number(n), n > 100));
+        (100..103).for_each(|n| ring.record(Number(n), n > 100, false));
         assert_eq!(contents(&ring), [100, 101]);
+    }
+
+    /// The values before a fault are kept if the ring is to begin anew while nothing has frozen it.
+    #[test]
+    fn only_a_frozen_ring_begins_anew() {
+        let ring = Ring::<Number, 1, 8>::new();
+        (0..20).for_each(|n| ring.record(Number(n), n > 18, true));
+        assert_eq!(contents(&ring), (12..20).collect::<Vec<_>>());
+        (90..100).for_each(|n| ring.record(Number(n), false, false));
+        assert_eq!(contents(&ring), (12..20).collect::<Vec<_>>());
+        (100..103).for_each(|n| ring.record(Number(n), n > 101, true));
+        assert_eq!(contents(&ring), [100, 101, 102]);
     }
 
     #[test]
     fn a_full_ring_stays_full_when_the_count_wraps() {
         let ring = Ring::<Number, 1, 8>::new();
         ring.written.store(u32::MAX - 3, Ordering::Relaxed);
-        (0..12).for_each(|n| ring.record(Number(n), n >= 11));
+        (0..12).for_each(|n| ring.record(Number(n), n >= 11, false));
         assert_eq!(contents(&ring), (4..12).collect::<Vec<_>>());
     }
 }

@@ -8,7 +8,7 @@ use crate::ports::{DriveCommand, DualDriveCommand, DualReport, MotorDemand, Repo
 use crate::time::{Clock, Instant};
 
 /// Between the PMaSynRM drive's operator and its control interrupt.
-pub type OperatorMailboxes = Mailboxes<DriveCommand, Report, 7, 15>;
+pub type OperatorMailboxes = Mailboxes<DriveCommand, Report, 7, 16>;
 /// Between the ZS9's operator and its control interrupt.
 pub type DualOperatorMailboxes = Mailboxes<DualDriveCommand, DualReport, 7, 19>;
 
@@ -105,14 +105,14 @@ impl Words<7> for Timed<DualDriveCommand> {
     }
 }
 
-impl Words<15> for Observation<Report> {
+impl Words<16> for Observation<Report> {
     #[inline]
-    fn to_words(self) -> [u32; 15] {
-        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n] = self.report.to_words();
-        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l, m, n]
+    fn to_words(self) -> [u32; 16] {
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o] = self.report.to_words();
+        [self.at.0, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o]
     }
 
-    fn from_words(words: [u32; 15]) -> Self {
+    fn from_words(words: [u32; 16]) -> Self {
         let [at, report @ ..] = words;
         let report = Report::from_words(report);
         Self { at: Instant(at), report }
@@ -307,7 +307,7 @@ mod tests {
             let acknowledged = u8::from(a) | u8::from(b) << 7;
             for code in 0..8 {
                 let [torque_nm, id_a, iq_a, voltage_v, omega] = [1.0, -2.0, 3.0, 4.0, -5.0];
-                let [map_error, udc_v, current_a, flowing_nm] = [6.0, 7.0, 8.0, 9.0];
+                let [map_error, udc_v, current_a, squares_a2, flowing_nm] = [6.0, 7.0, 8.0, 64.0, 9.0];
                 let mode = crate::modulation::Mode::from_code(code);
                 let report = Report {
                     torque_nm,
@@ -319,6 +319,7 @@ mod tests {
                     trip: None,
                     udc_v,
                     current_a,
+                    squares_a2,
                     flowing_nm,
                     speed_known,
                     acknowledged,

@@ -2,7 +2,8 @@
 //! enabling edge each apply to both.
 
 use super::Orders;
-use super::demand::wanted_nm;
+use super::ahead::{Ahead, STANDING_SHARE, limited_nm};
+use super::demand::Aim;
 use super::set_point::SetPoint;
 use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
 use crate::control::Demand;
@@ -100,7 +101,8 @@ impl DualRequest {
 /// One motor's demand on its way.
 #[derive(Clone, Copy, Debug)]
 enum DemandRamp {
-    Torque(Ramp),
+    /// The ramp, and the torque of it that the speed limit leaves, in N·m.
+    Torque(Ramp, f32),
     /// The speed's reference, and the torque that holds the speed, in N·m.
     Speed(SetPoint, f32),
 }
@@ -109,33 +111,43 @@ enum DemandRamp {
 struct Motor {
     /// Mechanical speed, in rad/s.
     speed: f32,
+    ahead: Ahead,
     /// Torque reference, in N·m.
     torque_nm: f32,
 }
 
 impl DemandRamp {
-    const AT_REST: Self = Self::Torque(Ramp::new());
+    const AT_REST: Self = Self::Torque(Ramp::new(), 0.0);
 
     fn is_at_rest(&self) -> bool {
-        matches!(self, Self::Torque(ramp) if ramp.torque_nm() == 0.0)
+        matches!(self, Self::Torque(ramp, _) if ramp.torque_nm() == 0.0)
     }
 
     /// One slot. A demand of the other kind begins at the motor's present state: torque at the value that has held the speed, speed at the motor's
     /// speed.
-    fn step(&mut self, wanted: Wanted, motor: &Motor, limits: &MotorLimits, settings: &Settings) {
+    fn step(
+        &mut self,
+        wanted: Wanted,
+        motor: &Motor,
+        limits: &MotorLimits,
+        (settings, rates): (&Settings, &Rates),
+    ) {
         *self = match (wanted, *self) {
             (Wanted::Torque(torque_nm), ramp) => {
-                let mut ramp = match ramp {
-                    Self::Torque(ramp) => ramp,
-                    Self::Speed(_, holding_nm) => Ramp::at(holding_nm),
+                let (mut ramp, given_nm) = match ramp {
+                    Self::Torque(ramp, given_nm) => (ramp, given_nm),
+                    Self::Speed(_, holding_nm) => (Ramp::at(holding_nm), holding_nm),
                 };
-                ramp.step(wanted_nm(torque_nm, motor.speed, limits), &Rates::of(settings));
-                Self::Torque(ramp)
+                let left = motor.ahead.left_share(motor.speed, given_nm, limits, settings.ratings);
+                ramp.step(limited_nm(torque_nm, motor.speed, left, limits), rates);
+                // What falls with a rising speed falls faster than slew and jerk let the ramp follow.
+                let rated = MotorLimits::rated(settings.ratings);
+                Self::Torque(ramp, limited_nm(ramp.torque_nm(), motor.speed, left, &rated))
             }
             (Wanted::Speed(target), ramp) => {
                 let (mut point, holding_nm) = match ramp {
                     Self::Speed(point, holding_nm) => (point, holding_nm),
-                    Self::Torque(ramp) => (SetPoint::at(motor.speed), ramp.torque_nm()),
+                    Self::Torque(_, given_nm) => (SetPoint::at(motor.speed), given_nm),
                 };
                 let target = limit(target, -limits.speed_rad_s, limits.speed_rad_s);
                 point.step(target, settings);
@@ -147,8 +159,8 @@ impl DemandRamp {
 
     fn demand(&self) -> MotorDemand {
         match self {
-            Self::Torque(ramp) => {
-                MotorDemand::Torque(Demand { torque_nm: ramp.torque_nm(), slew_limited: true })
+            Self::Torque(_, torque_nm) => {
+                MotorDemand::Torque(Demand { torque_nm: *torque_nm, slew_limited: true })
             }
             Self::Speed(point, _) => MotorDemand::Speed(point.speed()),
         }
@@ -159,6 +171,7 @@ impl DemandRamp {
 #[derive(Clone, Copy, Debug)]
 pub struct DualDemands {
     ramps: [DemandRamp; 2],
+    ahead: [Ahead; 2],
     /// The limits in force; `None`: as rated.
     limits: Option<[MotorLimits; 2]>,
     link_ref_v: f32,
@@ -178,8 +191,13 @@ impl Demands for DualDemands {
     type DriveCommand = DualDriveCommand;
     type Status = [MotorDemand; 2];
 
-    const AT_REST: Self =
-        Self { ramps: [DemandRamp::AT_REST; 2], limits: None, link_ref_v: 0.0, resting_v: None };
+    const AT_REST: Self = Self {
+        ramps: [DemandRamp::AT_REST; 2],
+        ahead: [Ahead::UNKNOWN; 2],
+        limits: None,
+        link_ref_v: 0.0,
+        resting_v: None,
+    };
 
     fn levels(request: &DualRequest) -> Levels {
         request.levels
@@ -192,6 +210,7 @@ impl Demands for DualDemands {
             at: *at,
             udc_v: report.capacitor_v,
             current_a: larger(i1, i2),
+            squares_a2: 0.0,
             reference_a: 0.0,
             map_error: 0.0,
             omega: larger(w1.abs(), w2.abs()),
@@ -217,20 +236,31 @@ impl Demands for DualDemands {
         if ![sum(m1), sum(m2), request.link_ref_v].iter().sum::<f32>().is_finite() {
             return Some(Refusal::RequestNotFinite);
         }
-        let [low_v, high_v, _] = dual::Settings::link_range_v(ratings);
         let inside = m1.limits.are_within(ratings)
             && m2.limits.are_within(ratings)
-            && (low_v..=high_v).contains(&request.link_ref_v);
+            && link_is_within(request, ratings);
         (!inside).then_some(Refusal::LimitOutOfRange)
     }
 
-    fn asks_torque(request: &DualRequest) -> bool {
-        request.motors.iter().any(|motor| motor.wanted.value() != 0.0)
+    /// A speed of zero takes a torque while the rotor turns.
+    fn asks_torque(request: &DualRequest, report: &DualReport, ratings: &Ratings) -> bool {
+        let turning = STANDING_SHARE * ratings.max_speed_rad_s * ratings.pole_pairs;
+        request.motors.iter().zip(report.omega).any(|(motor, omega)| match motor.wanted {
+            Wanted::Torque(torque_nm) => torque_nm != 0.0,
+            Wanted::Speed(speed) => speed != 0.0 || omega.abs() > turning,
+        })
     }
 
-    fn take_limits(&mut self, request: &DualRequest) {
-        self.limits = Some(request.motors.map(|motor| motor.limits));
-        self.link_ref_v = request.link_ref_v;
+    fn take_limits(&mut self, request: &DualRequest, settings: &Settings) {
+        let ratings = settings.ratings;
+        let mut limits = self.limits(settings);
+        for (own, MotorRequest { limits: asked, .. }) in limits.iter_mut().zip(&request.motors) {
+            *own = if asked.are_within(ratings) { *asked } else { *own };
+        }
+        self.limits = Some(limits);
+        if link_is_within(request, ratings) {
+            self.link_ref_v = request.link_ref_v;
+        }
     }
 
     fn are_at_rest(&self) -> bool {
@@ -239,19 +269,23 @@ impl Demands for DualDemands {
 
     fn drop(&mut self) {
         self.ramps = [DemandRamp::AT_REST; 2];
+        self.ahead = [Ahead::UNKNOWN; 2];
     }
 
-    fn step(&mut self, request: Option<&DualRequest>, report: &DualReport, settings: &Settings) {
-        let limits = self.limits(settings);
+    fn step(&mut self, aim: Aim<DualRequest>, report: &DualReport, settings: &Settings) {
+        let (limits, request) = (self.limits(settings), aim.request());
         let wanted = request.map_or([Wanted::Torque(0.0); 2], |request| request.motors.map(|m| m.wanted));
         let DualReport { omega, torque_nm, source_v, .. } = *report;
         self.resting_v = if request.is_none() { Some(source_v) } else { None };
         let motors = omega.into_iter().zip(torque_nm);
-        for (((way, wanted), limits), (omega, torque_nm)) in
-            self.ramps.iter_mut().zip(wanted).zip(&limits).zip(motors)
+        let ways = self.ramps.iter_mut().zip(&mut self.ahead);
+        for ((((way, ahead), wanted), limits), (omega, torque_nm)) in
+            ways.zip(wanted).zip(&limits).zip(motors)
         {
-            let motor = Motor { speed: omega / settings.ratings.pole_pairs, torque_nm };
-            way.step(wanted, &motor, limits, settings);
+            let speed = omega / settings.ratings.pole_pairs;
+            ahead.step(speed, settings.slot_s);
+            let motor = Motor { speed, ahead: *ahead, torque_nm };
+            way.step(wanted, &motor, limits, (settings, &aim.rates(settings)));
         }
     }
 
@@ -278,6 +312,12 @@ impl Demands for DualDemands {
             calibrate,
         }
     }
+}
+
+/// `true` for a link voltage that the network can make.
+fn link_is_within(request: &DualRequest, ratings: &Ratings) -> bool {
+    let [low_v, high_v, _] = dual::Settings::link_range_v(ratings);
+    (low_v..=high_v).contains(&request.link_ref_v)
 }
 
 /// The larger of two magnitudes; NaN counts as larger than everything.
@@ -307,15 +347,42 @@ mod tests {
         assert_eq!(DualDemands::refused(trip).trip, Some(trip));
     }
 
+    /// A torque on its way is dropped where the gates are off.
+    #[test]
+    fn demands_at_rest_are_none() {
+        let settings = Settings::rated(&BUILT_IN.ratings, 1e-3, None);
+        let mut request = DualRequest::idle(&BUILT_IN.ratings, 600.0);
+        request.motors[1].wanted = Wanted::Torque(10.0);
+        let mut demands = DualDemands::AT_REST;
+        (0..100).for_each(|_| demands.step(Aim::Request(&request), &DualReport::default(), &settings));
+        assert!(!demands.are_at_rest());
+        demands.rest(&DualReport::default(), true);
+        assert!(demands.are_at_rest());
+    }
+
     #[test]
     fn either_motor_asks_for_torque() {
-        let idle = DualRequest::idle(&BUILT_IN.ratings, 600.0);
-        assert!(!DualDemands::asks_torque(&idle));
-        for (motor, wanted) in [(0, Wanted::Torque(1.0)), (1, Wanted::Torque(-1.0)), (1, Wanted::Speed(20.0))]
-        {
+        let ratings = &BUILT_IN.ratings;
+        let idle = DualRequest::idle(ratings, 600.0);
+        let turning = STANDING_SHARE * ratings.max_speed_rad_s * ratings.pole_pairs;
+        let asks = |motor: usize, wanted, omega| {
             let mut request = idle;
             request.motors[motor].wanted = wanted;
-            assert!(DualDemands::asks_torque(&request), "{motor} {wanted:?}");
+            let mut report = DualReport::default();
+            report.omega[motor] = omega;
+            DualDemands::asks_torque(&request, &report, ratings)
+        };
+        for motor in [0, 1] {
+            for (wanted, omega, asked) in [
+                (Wanted::Torque(0.0), 10.0 * turning, false),
+                (Wanted::Torque(-1.0), 0.0, true),
+                (Wanted::Speed(20.0), 0.0, true),
+                (Wanted::Speed(0.0), 0.99 * turning, false),
+                (Wanted::Speed(0.0), 1.01 * turning, true),
+                (Wanted::Speed(0.0), -1.01 * turning, true),
+            ] {
+                assert_eq!(asks(motor, wanted, omega), asked, "{motor} {wanted:?} {omega}");
+            }
         }
     }
 }

@@ -22,8 +22,8 @@ const SMOOTHED_S: f32 = 0.016;
 pub(super) struct Grip {
     /// Direction of the torque.
     along: f32,
-    /// The rotor's speed, smoothed, mechanical, in rad/s.
-    speed: f32,
+    /// The rotor's speed, smoothed, mechanical, in rad/s; `None` before the first slot.
+    speed: Option<f32>,
     /// The reference, along the torque, mechanical, in rad/s.
     reference: f32,
     /// Share of the torque that returns slowly.
@@ -33,7 +33,7 @@ pub(super) struct Grip {
 }
 
 impl Grip {
-    pub(super) const FULL: Self = Self { along: 0.0, speed: 0.0, reference: 0.0, held: 1.0, share: 1.0 };
+    pub(super) const FULL: Self = Self { along: 0.0, speed: None, reference: 0.0, held: 1.0, share: 1.0 };
 
     /// Share of the demand that the rail can carry.
     pub(super) const fn share(&self) -> f32 {
@@ -45,8 +45,10 @@ impl Grip {
     pub(super) fn step(&mut self, torque_nm: f32, speed: f32, settings: &Settings) {
         let Settings { ratings, slot_s, train, .. } = *settings;
         let along = if torque_nm == 0.0 { 0.0 } else { 1.0_f32.copysign(torque_nm) };
-        self.speed += (speed - self.speed) * (slot_s / (slot_s + SMOOTHED_S));
-        let (now, most) = (along * self.speed, self.reference + train.acceleration_rad_s2 * slot_s);
+        let before = self.speed.unwrap_or(speed);
+        let smoothed = before + (speed - before) * (slot_s / (slot_s + SMOOTHED_S));
+        self.speed = Some(smoothed);
+        let (now, most) = (along * smoothed, self.reference + train.acceleration_rad_s2 * slot_s);
         self.reference = if along != self.along || now < most { now } else { most };
         self.along = along;
         let slip = now - self.reference - FREE * ratings.max_speed_rad_s;
@@ -78,10 +80,12 @@ mod tests {
         grip
     }
 
+    /// That of one which has coasted before, and of one that is enabled at its speed.
     #[test]
     fn a_train_on_its_rails_has_all_of_its_torque() {
-        for (torque, speed) in WAYS {
-            let mut grip = coasting(speed * 200.0);
+        let starts = [coasting, |_| Grip::FULL];
+        for ((torque, speed), start) in WAYS.into_iter().flat_map(|way| starts.map(|start| (way, start))) {
+            let mut grip = start(speed * 200.0);
             for slot in 0..3_000 {
                 grip.step(torque * 800.0, speed * 200.0 + torque * 19.0e-3 * slot as f32, &settings());
                 assert_eq!(grip.share(), 1.0);
@@ -163,7 +167,9 @@ mod tests {
             let mut grip = Grip::FULL;
             // The speed whose smoothed value is the wanted one.
             let step = |grip: &mut Grip, torque_nm: f32, wanted: f32| {
-                let speed = grip.speed + (wanted - grip.speed) * (1.0 + SMOOTHED_S / settings.slot_s);
+                let speed = grip.speed.map_or(wanted, |before| {
+                    before + (wanted - before) * (1.0 + SMOOTHED_S / settings.slot_s)
+                });
                 grip.step(torque_nm, speed, &settings);
             };
             // Earlier, higher speed is forgotten: the reference comes down with the rotor.

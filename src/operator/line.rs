@@ -41,13 +41,14 @@ pub(super) struct Precharge {
     stage: Charging,
     /// Slots in this stage.
     slots: u32,
-    /// Link voltage when the rate was last taken, in V.
+    /// Link voltage when the rate was last taken, in V, and slots since then.
     before_v: f32,
+    since: u32,
 }
 
 impl Precharge {
     pub(super) const fn new() -> Self {
-        Self { stage: Charging::RelayCloses, slots: 0, before_v: 0.0 }
+        Self { stage: Charging::RelayCloses, slots: 0, before_v: 0.0, since: 0 }
     }
 
     pub(super) const fn switches(&self) -> Switches {
@@ -73,7 +74,7 @@ impl Precharge {
                 if passed_s > TOO_LONG * line.precharge_s {
                     return Outcome::Failed((Fault::PrechargeTimeout, udc_v, lowest_v));
                 }
-                if self.is_near(udc_v, line, settings) && udc_v >= lowest_v {
+                if self.is_near(input, line, settings) && udc_v >= lowest_v {
                     self.enter(Charging::MainCloses, udc_v);
                 }
                 return Outcome::Going;
@@ -93,16 +94,18 @@ impl Precharge {
     }
 
     fn enter(&mut self, stage: Charging, udc_v: f32) {
-        *self = Self { stage, slots: 0, before_v: udc_v };
+        *self = Self { stage, slots: 0, before_v: udc_v, since: 0 };
     }
 
-    /// `true` if the source is near; checked every [`RATE_SLOTS`] slots.
-    fn is_near(&mut self, udc_v: f32, line: &Line, settings: &Settings) -> bool {
-        if !self.slots.is_multiple_of(RATE_SLOTS) {
+    /// `true` if the source is near; checked every [`RATE_SLOTS`] slots, at an observation that is fresh.
+    fn is_near(&mut self, input: &Situation, line: &Line, settings: &Settings) -> bool {
+        self.since = self.since.saturating_add(1);
+        if !input.fresh || self.since < RATE_SLOTS {
             return false;
         }
-        let rate_v_s = (udc_v - self.before_v) / (RATE_SLOTS as f32 * settings.slot_s);
-        self.before_v = udc_v;
+        let udc_v = input.observed.udc_v;
+        let rate_v_s = (udc_v - self.before_v) / (self.since as f32 * settings.slot_s);
+        (self.before_v, self.since) = (udc_v, 0);
         (rate_v_s * line.precharge_s).abs() < GAP_SHARE * settings.ratings.dc_link_nominal_v
     }
 }

@@ -2,10 +2,11 @@
 
 mod commands;
 
+use super::contacts::Contacts;
 use super::demand;
 use super::line::{Discharge, Outcome, Precharge};
 use super::{
-    ACKNOWLEDGE_S, Configuration, Demands, Feedback, Input, Orders, Output, Refusal, SELF_TEST_S, Seen,
+    ACKNOWLEDGE_S, Aim, Configuration, Demands, Feedback, Input, Orders, Output, Refusal, SELF_TEST_S, Seen,
     Settings, Situation, State, Status, Switches, health, line,
 };
 use crate::control::Warmth;
@@ -52,6 +53,7 @@ pub struct Operator<D> {
     acknowledge: u8,
     thermal: ThermalState,
     temperatures: Option<Temperatures>,
+    contacts: Contacts,
 }
 
 /// Levels whose rising edge is a command.
@@ -78,6 +80,7 @@ impl<D: Demands> Operator<D> {
             acknowledge: 0,
             thermal: ThermalState::new(),
             temperatures: None,
+            contacts: Contacts::OPEN,
         }
     }
 
@@ -106,13 +109,18 @@ impl<D: Demands> Operator<D> {
     ) -> Output<D::DriveCommand, D::Status> {
         let seen = D::seen(input.observed);
         let thermal = self.warm(&seen, input.feedback, settings);
-        let situation = Situation { observed: &seen, feedback: input.feedback, thermal };
+        if input.fresh {
+            self.contacts.step(input.feedback, settings.slot_s);
+        }
+        let feedback = self.contacts.believed(input.feedback);
+        let situation = Situation { observed: &seen, feedback: &feedback, thermal, fresh: input.fresh };
         self.look_at_values(input.request, settings);
         self.supervise(&situation, settings);
         self.advance(&situation, settings);
         self.obey(input, &situation, settings);
         self.shape(input, settings);
         let (enable, switches) = self.outputs(&situation, settings);
+        self.contacts.order(&switches);
         let calibrate = D::levels(input.request).calibrate && self.state() == State::Enabled;
         let orders = Orders { enable, calibrate, acknowledge: self.acknowledge };
         Output {
@@ -136,9 +144,9 @@ impl<D: Demands> Operator<D> {
     #[inline(never)]
     fn warm(&mut self, seen: &Seen, feedback: &Feedback, settings: &Settings) -> Option<FailedCheck> {
         let thermal = settings.thermal.filter(|_| D::DERATES)?;
-        let Seen { current_a, reference_a, udc_v, map_error, .. } = *seen;
+        let Seen { current_a, squares_a2, reference_a, udc_v, map_error, .. } = *seen;
         let max_current_a = settings.ratings.max_current_a;
-        let load = Load { current_a, reference_a, udc_v, map_error, max_current_a };
+        let load = Load { current_a, squares_a2, reference_a, udc_v, map_error, max_current_a };
         let (temperatures, failed) =
             self.thermal.step(&load, feedback.temperatures, thermal, settings.slot_s);
         self.temperatures = temperatures;
@@ -154,13 +162,15 @@ impl<D: Demands> Operator<D> {
         self.refusals = self.refusals.wrapping_add(1);
     }
 
-    /// Adopts valid limits; a wrong value is refused once, not in every slot in which it is repeated.
+    /// Adopts the valid limits; a wrong value is refused once, not in every slot in which it is repeated.
     fn look_at_values(&mut self, request: &D::Request, settings: &Settings) {
         let wrong = D::wrong_with(request, settings);
+        if wrong != Some(Refusal::RequestNotFinite) {
+            self.demands.take_limits(request, settings);
+        }
         match wrong {
-            None => self.demands.take_limits(request),
-            Some(reason) if self.bad_values != Some(reason) => self.refuse(reason),
-            Some(_) => {}
+            Some(reason) if self.bad_values != wrong => self.refuse(reason),
+            _ => {}
         }
         self.bad_values = wrong;
     }
@@ -278,15 +288,18 @@ impl<D: Demands> Operator<D> {
 
     /// The demands after limits, slew and jerk.
     fn shape(&mut self, input: &Input<D::Request, D::Report>, settings: &Settings) {
-        match self.phase {
+        let aim = match self.phase {
             Phase::Pulsing if self.bad_values != Some(Refusal::RequestNotFinite) => {
-                self.demands.step(Some(input.request), &input.observed.report, settings);
+                Aim::Request(input.request)
             }
-            Phase::Pulsing | Phase::Coasting { .. } | Phase::Stopping => {
-                self.demands.step(None, &input.observed.report, settings);
+            Phase::Stopping => Aim::Stop,
+            Phase::Pulsing | Phase::Coasting { .. } => Aim::Coast,
+            _ => {
+                let connected = matches!(self.phase, Phase::Charged);
+                return self.demands.rest(&input.observed.report, connected);
             }
-            _ => self.demands.drop(),
-        }
+        };
+        self.demands.step(aim, &input.observed.report, settings);
     }
 
     /// The permission to pulse, and the switches.

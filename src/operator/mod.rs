@@ -11,6 +11,8 @@
 
 #![forbid(unsafe_code)]
 
+mod ahead;
+mod contacts;
 mod demand;
 mod dual;
 mod grip;
@@ -26,7 +28,7 @@ mod slot;
 mod status;
 mod train;
 
-pub use demand::{Demands, Orders, TorqueDemand};
+pub use demand::{Aim, Demands, Orders, TorqueDemand};
 pub use dual::{DualDemands, DualRequest, MotorLimits, MotorRequest, Wanted};
 pub use ramp::{Ramp, Rates};
 pub use request::{Configuration, Feedback, Levels, Limits, Request, Seen};
@@ -67,6 +69,8 @@ pub struct Input<'a, Q = Request, R = Report> {
     pub observed: &'a Observation<R>,
     /// The board's feedback.
     pub feedback: &'a Feedback,
+    /// `true` for an observation and a feedback that were not there before; `false` in the steps of slots that were missed.
+    pub fresh: bool,
 }
 
 /// The inputs of the state machine itself, for any drive.
@@ -76,6 +80,7 @@ struct Situation<'a> {
     feedback: &'a Feedback,
     /// The first failed check of the temperatures and their sensors.
     thermal: Option<FailedCheck>,
+    fresh: bool,
 }
 
 /// A step's result.

@@ -47,8 +47,8 @@ impl Ramp {
         self.torque_nm
     }
 
-    /// One step towards a target, in N·m. The target is reached exactly. It is overshot only if it came nearer, or turned back, faster than the jerk
-    /// limit lets the rate follow.
+    /// One step towards a target, in N·m, which is reached exactly and never passed. The jerk limits how a rate grows, and how it ends before a target
+    /// that stays: torque never leads away from its target, and stops where the target has come to meet it.
     #[inline(never)]
     pub fn step(&mut self, target_nm: f32, rates: &Rates) -> f32 {
         let Rates { step_s, slew_nm_s, jerk_nm_s2 } = *rates;
@@ -58,15 +58,11 @@ impl Ramp {
         let able = change * (sqrt(0.25 + 2.0 * error.abs() / (change * step_s)) - 0.5);
         let rate = if able < slew_nm_s { able } else { slew_nm_s };
         let wanted = if error < 0.0 { -rate } else { rate };
-        let before_nm_s = self.rate_nm_s;
-        self.rate_nm_s = limit(wanted, self.rate_nm_s - change, self.rate_nm_s + change);
+        let before_nm_s = if self.rate_nm_s * error < 0.0 { 0.0 } else { self.rate_nm_s };
+        self.rate_nm_s = limit(wanted, before_nm_s - change, before_nm_s + change);
         self.torque_nm += self.rate_nm_s * step_s;
-        let passed = (target_nm - self.torque_nm) * error <= 0.0;
-        // Landing on the target takes one step at exactly the rate that leads there, and rest after it.
-        let landing_nm_s = error / step_s;
-        let softly = landing_nm_s.abs() <= 2.0 * change && (landing_nm_s - before_nm_s).abs() <= 2.0 * change;
-        if passed && softly {
-            *self = Self { torque_nm: target_nm, rate_nm_s: 0.0 };
+        if (target_nm - self.torque_nm) * error <= 0.0 {
+            *self = Self::at(target_nm);
         }
         self.torque_nm
     }
@@ -89,22 +85,32 @@ mod tests {
         (torque_nm, ramp.rate_nm_s / CHANGE_NM_S)
     }
 
-    /// Landing ends the rate in two steps of the jerk: the step's own rate is at most both of them, and no farther than that from the rate before.
+    /// Already on the target, or where the step would pass it, at whatever rate.
     #[test]
-    fn a_ramp_lands_where_two_steps_of_the_jerk_suffice() {
-        // Already on the target; passing it; at a rate that is not quite gone.
-        for (below, rate) in
-            [(0.0, 0.0), (0.0, 1.5), (0.0, -1.5), (0.5, 2.3), (1.5, 3.0), (1.9, 3.8), (-0.5, -2.3)]
-        {
+    fn a_ramp_ends_on_its_target() {
+        for (below, rate) in [
+            (0.0, 0.0),
+            (0.0, 1.5),
+            (0.0, -1.5),
+            (0.5, 2.3),
+            (1.9, 3.8),
+            (-0.5, -2.3),
+            (2.1, 3.5),
+            (0.5, 50.0),
+        ] {
             assert_eq!(stepped(below, rate), (100.0, 0.0), "{below} {rate}");
         }
-        // Too fast: it passes, slows down as the jerk allows, and comes back.
-        for (below, rate) in [(0.5, 2.7), (0.0, 2.2), (2.1, 3.5), (0.5, 5.0)] {
-            let (torque_nm, after) = stepped(below, rate);
-            assert!(
-                torque_nm > 100.0 && (after - (rate - 1.0)).abs() < 1e-3,
-                "{below} {rate}: {torque_nm} {after}"
-            );
+    }
+
+    /// A rate that leads away ends at once, and the way back begins as from rest.
+    #[test]
+    fn a_ramp_never_leads_away_from_its_target() {
+        for (below, away) in [(50.0, -20.0), (-50.0, 20.0), (50.0, -1e-3)] {
+            assert_eq!(stepped(below, away), stepped(below, 0.0), "{below} {away}");
+            let (_, after) = stepped(below, away);
+            assert!((after - 1_f32.copysign(below)).abs() < 1e-3, "{after}");
         }
+        let (_, after) = stepped(50.0, 2.0);
+        assert!((after - 3.0).abs() < 1e-3, "one that leads there goes on: {after}");
     }
 }

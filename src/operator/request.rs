@@ -72,7 +72,7 @@ pub struct Levels {
     pub discharge: bool,
     /// Rising edge: acknowledge.
     pub acknowledge: bool,
-    /// Calibrate the zero of the position sensor; no drive with two has it.
+    /// Calibrate the zero of the position sensor, or of both.
     pub calibrate: bool,
 }
 
@@ -119,6 +119,22 @@ impl Limits {
             link_low_v: ends.motoring_none_v,
             link_high_v: ends.braking_none_v,
         }
+    }
+
+    /// `true` for torques and a speed within the rated ones.
+    pub(super) fn motor_is_within(&self, rated: &Self) -> bool {
+        (0.0..=rated.motoring_nm).contains(&self.motoring_nm)
+            && (0.0..=rated.braking_nm).contains(&self.braking_nm)
+            && (0.0..=rated.speed_rad_s).contains(&self.speed_rad_s)
+            && self.speed_rad_s > 0.0
+    }
+
+    /// `true` for a window of the link within the rated one.
+    pub(super) fn link_is_within(&self, rated: &Self) -> bool {
+        let window = rated.link_low_v..=rated.link_high_v;
+        window.contains(&self.link_low_v)
+            && window.contains(&self.link_high_v)
+            && self.link_low_v < self.link_high_v
     }
 }
 
@@ -182,6 +198,8 @@ pub struct Seen {
     pub udc_v: f32,
     /// Largest magnitude of a phase current, in A.
     pub current_a: f32,
+    /// Sum of the squares of the phase currents, in A²; 0 of a drive without temperatures.
+    pub squares_a2: f32,
     /// Magnitude of the current's reference, in A; 0 if the map's error is not known.
     pub reference_a: f32,
     /// Share by which the machine's flux linkage seems to exceed the map's; 0 while that is not known.

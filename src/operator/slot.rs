@@ -88,9 +88,9 @@ impl<D: Demands> Slot<D> {
         settings: &Settings,
     ) -> Output<D::DriveCommand, D::Status> {
         self.done = Some(observed.at);
-        let input = Input { request: &request, observed, feedback: &feedback };
+        let input = Input { request: &request, observed, feedback: &feedback, fresh: true };
         for _ in 1..slots.min(MOST_STEPS) {
-            self.operator.step(&input, settings);
+            self.operator.step(&Input { fresh: false, ..input }, settings);
         }
         self.operator.step(&input, settings)
     }

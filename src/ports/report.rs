@@ -30,6 +30,8 @@ pub struct Report {
     pub udc_v: f32,
     /// Largest magnitude of a phase current, in A.
     pub current_a: f32,
+    /// Sum of the squares of the phase currents, in A²: the copper loss over the resistance.
+    pub squares_a2: f32,
     /// `true` once the speed has been followed long enough to be used.
     pub speed_known: bool,
     /// Number of the acknowledge that both interrupts have carried out.
@@ -49,9 +51,9 @@ impl Report {
     }
 }
 
-impl Words<14> for Report {
+impl Words<15> for Report {
     #[inline]
-    fn to_words(self) -> [u32; 14] {
+    fn to_words(self) -> [u32; 15] {
         let [code, value, limit, at] = trip_to_words(self.trip);
         let flags = u32::from(self.acknowledged)
             | u32::from(self.speed_known) << 8
@@ -72,12 +74,13 @@ impl Words<14> for Report {
             self.current_a.to_bits(),
             self.flowing_nm.to_bits(),
             self.angle_zero.0,
+            self.squares_a2.to_bits(),
         ]
     }
 
-    fn from_words(words: [u32; 14]) -> Self {
+    fn from_words(words: [u32; 15]) -> Self {
         let [torque, id, iq, voltage, omega, map_error, code, value, limit, at, measured @ ..] = words;
-        let [udc, current, flowing, angle_zero] = measured;
+        let [udc, current, flowing, angle_zero, squares] = measured;
         Self {
             torque_nm: f32::from_bits(torque),
             id_a: f32::from_bits(id),
@@ -88,6 +91,7 @@ impl Words<14> for Report {
             trip: trip_from_words([code, value, limit, at]),
             udc_v: f32::from_bits(udc),
             current_a: f32::from_bits(current),
+            squares_a2: f32::from_bits(squares),
             flowing_nm: f32::from_bits(flowing),
             speed_known: code >> 24 & 1 != 0,
             acknowledged: (code >> 16) as u8,

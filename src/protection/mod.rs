@@ -5,6 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+mod boost;
 mod checks;
 mod fault;
 mod frozen;
@@ -15,6 +16,7 @@ mod safe;
 mod unexplained;
 mod words;
 
+pub use boost::BoostWatch;
 pub use checks::{
     INNOVATION_RAD, are_sound, check_angle, check_currents, check_demand, check_known, check_measurements,
     check_speed, check_undervoltage, is_sound,

@@ -55,7 +55,7 @@ mod tests {
         Magnets { per_k: -1e-3, map_c: 20.0, derating: Derating { from_c: 120.0, none_c: 150.0 } };
 
     fn load(reference_a: f32, map_error: f32) -> Load {
-        Load { current_a: 0.0, reference_a, udc_v: 1_500.0, map_error, max_current_a: 200.0 }
+        Load { current_a: 0.0, squares_a2: 0.0, reference_a, udc_v: 1_500.0, map_error, max_current_a: 200.0 }
     }
 
     #[test]

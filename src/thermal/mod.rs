@@ -14,7 +14,6 @@ mod sensor;
 
 pub use derate::Derating;
 pub use magnet::Magnets;
-pub(crate) use model::copper_w;
 pub use model::{DeviceLosses, Rise, copper_factor};
 pub use sensor::{Element, Sensor};
 
@@ -80,6 +79,8 @@ pub struct Ratios {
 pub struct Load {
     /// Largest magnitude of a phase current, in A.
     pub current_a: f32,
+    /// Sum of the squares of the phase currents, in A²: the copper loss over the resistance.
+    pub squares_a2: f32,
     /// Magnitude of the current's reference, in A: the fundamental's, without ripple.
     pub reference_a: f32,
     /// Voltage of the DC link, in V.
@@ -164,7 +165,7 @@ impl ThermalState {
             return None;
         };
         let ohm = thermal.resistance_ohm * copper_factor(sensor_c + self.winding.kelvin());
-        let winding_k = self.winding.step(copper_w(load.current_a, ohm), &thermal.winding, slot_s);
+        let winding_k = self.winding.step(ohm * load.squares_a2, &thermal.winding, slot_s);
         let device_w = thermal.losses.watts(load.current_a, load.udc_v);
         let junction_k = self.junction.step(device_w, &thermal.junction, slot_s);
         let (winding_c, junction_c) = (sensor_c + winding_k, heat_sink_c + junction_k);

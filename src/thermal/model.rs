@@ -38,15 +38,6 @@ pub fn copper_factor(celsius: f32) -> f32 {
     1.0 + 3.93e-3 * (celsius - 20.0)
 }
 
-/// Ratio of the mean square of the largest magnitude of three phase currents to that of their peak, 1/2 + 3√3/4π.
-const LARGEST: f32 = 0.913_5;
-
-/// Copper loss of three phases, in W, from their largest current in A: correct on average for a turning machine, up to a tenth too high at
-/// standstill.
-pub(crate) fn copper_w(current_a: f32, ohm: f32) -> f32 {
-    1.5 / LARGEST * ohm * current_a * current_a
-}
-
 /// The rise of a part, in K.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RiseState(f32);
@@ -86,18 +77,6 @@ mod tests {
         assert!((state.kelvin() - 50.0).abs() < 0.1, "{}", state.kelvin());
         state.step(f32::NAN, &rise, 1e-3);
         assert!((state.kelvin() - 50.0).abs() < 0.1);
-    }
-
-    #[test]
-    fn the_copper_loss_of_a_turning_machine_is_its_mean() {
-        let peak_a = 100.0_f32;
-        let angles = (0..3_600).map(|k| (k as f32 * 0.1).to_radians());
-        let largest = |angle: f32| {
-            let phases = [0.0, -2.0, 2.0].map(|third| (angle + third * core::f32::consts::FRAC_PI_3).cos());
-            phases.iter().fold(0.0_f32, |most, phase| most.max(phase.abs())) * peak_a
-        };
-        let mean_w = angles.map(|angle| copper_w(largest(angle), 0.1)).sum::<f32>() / 3_600.0;
-        assert!((mean_w / 1_500.0 - 1.0).abs() < 1e-3, "{mean_w}");
     }
 
     #[test]

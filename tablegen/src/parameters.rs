@@ -103,11 +103,11 @@ parameters! {
         /// Voltage of its link outside shoot-through until somebody asks for another, in V; default that of `dc_link_nominal_v`.
         zs9_link_v: ABOVE_ZERO..=1e5, 2.0 * dc_link_nominal_v / TWO_LEVEL_SHARE - zs9_source_v;
         /// Inductance of each inductor of its network, in H; default as much for both motors' `max_power_w` at the source's voltage as the paper's.
-        zs9_inductance_h: ABOVE_ZERO..=10.0, 78.6e-6 * zs9_source_v * zs9_source_v / (2.0 * max_power_w);
+        zs9_inductance_h: ABOVE_ZERO..=0.1, 78.6e-6 * zs9_source_v * zs9_source_v / (2.0 * max_power_w);
         /// Resistance of each, in ohm; default 20 Ω a henry.
-        zs9_resistance_ohm: 0.0..=1e3, 20.0 * zs9_inductance_h;
+        zs9_resistance_ohm: 0.0..=1.0, 20.0 * zs9_inductance_h;
         /// Capacitance of each capacitor of its network, in F; default as `zs9_inductance_h`.
-        zs9_capacitance_f: ABOVE_ZERO..=100.0, 3.18e-3 * 2.0 * max_power_w / (zs9_source_v * zs9_source_v);
+        zs9_capacitance_f: ABOVE_ZERO..=0.1, 3.18e-3 * 2.0 * max_power_w / (zs9_source_v * zs9_source_v);
     }
 }
 
@@ -160,7 +160,7 @@ impl Parameters {
     }
 
     /// The line of a key, if the file has it.
-    pub(crate) fn line_of(&self, key: &str) -> Option<u64> {
+    pub fn line_of(&self, key: &str) -> Option<u64> {
         self.lines.get(key).copied()
     }
 

@@ -47,7 +47,8 @@ impl World {
     fn slot(&mut self) -> DualStatus {
         let line = Line::rated(&self.ratings, 0.05, 0.5).without_chopper();
         let settings = Settings::rated(&self.ratings, 1e-3, Some(line));
-        let input = Input { request: &self.request, observed: &self.observed, feedback: &self.feedback };
+        let input =
+            Input { request: &self.request, observed: &self.observed, feedback: &self.feedback, fresh: true };
         let output = self.operator.step(&input, &settings);
         let (switches, report) = (output.status.switches, &mut self.observed.report);
         assert_eq!(switches.chopper, 0.0);

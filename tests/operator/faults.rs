@@ -158,3 +158,48 @@ fn the_chopper_follows_the_link_in_every_state() {
     world.slot();
     assert_eq!(world.switches().chopper, 0.0, "not a number calls for nothing");
 }
+
+/// An idle loop that is away while the link charges has seen no rate since: the main contactor still closes within 2 % of the source.
+#[test]
+fn slots_that_were_missed_do_not_close_the_main_contactor_early() {
+    for (before, missed) in (0..40).flat_map(|before| [21, 45, 49].map(|missed| (before, missed))) {
+        let mut world = World::ready();
+        world.edge(|request, level| request.charge = level);
+        while world.observed.udc_v < 1_010.0 {
+            world.slot();
+        }
+        world.slots(before);
+        world.missed(missed);
+        while !world.slot().status.switches.main {
+            assert_eq!(world.state(), State::Precharge);
+        }
+        let gap_v = world.source_v - world.observed.udc_v;
+        assert!(gap_v < 1.01 * 0.02 * 1_500.0, "{before} slots, {missed} missed: {gap_v} V");
+    }
+}
+
+/// A contact may bounce for 10 ms on its way and be disturbed while the gates pulse; one that has let go is a fault.
+#[test]
+fn a_contact_that_bounces_is_no_fault_and_one_that_stays_away_is() {
+    let mut world = World::ready();
+    world.edge(|request, level| request.charge = level);
+    while !world.feedback.precharge_closed {
+        world.slot();
+    }
+    for closed in [true, false, true, false, false, true] {
+        world.feedback.precharge_closed = closed;
+        world.slot();
+    }
+    world.feedback.precharge_closed = true;
+    world.until(State::Charged);
+    world.edge(|request, level| request.enable = level);
+    for (slots, fault) in [(9, None), (9, None), (12, Some(Fault::Contactor))] {
+        for _ in 0..slots {
+            world.feedback.main_closed = false;
+            world.slot();
+        }
+        assert_eq!(world.fault(), fault);
+        world.feedback.main_closed = true;
+        world.slot();
+    }
+}

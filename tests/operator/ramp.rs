@@ -5,7 +5,7 @@ use tractive::operator::{Ramp, Rates};
 
 const RATES: Rates = Rates { step_s: 1e-3, slew_nm_s: 9_880.0, jerk_nm_s2: 197_600.0 };
 
-/// Follows targets; every step keeps slew and jerk. Returns the torques.
+/// Follows targets; every step keeps slew, a rate grows as the jerk allows, and no step leads away from its target or beyond it. Returns the torques.
 fn follow(targets: &[(f32, u32)]) -> Vec<f32> {
     let (mut ramp, mut last, mut rate) = (Ramp::new(), 0.0_f32, 0.0_f32);
     let mut torques = Vec::new();
@@ -14,9 +14,10 @@ fn follow(targets: &[(f32, u32)]) -> Vec<f32> {
             let torque = ramp.step(*target, &RATES);
             let now = (torque - last) / RATES.step_s;
             assert!(now.abs() <= RATES.slew_nm_s * 1.001 + 1.0, "slew {now}");
-            // The last step into the target may end a rest of two steps of the jerk.
-            let change = (now - rate).abs();
-            assert!(change <= 2.0 * RATES.jerk_nm_s2 * RATES.step_s * 1.001 + 2.0, "jerk {change}");
+            let grown = now.abs() - if now * rate < 0.0 { 0.0 } else { rate.abs() };
+            assert!(grown <= RATES.jerk_nm_s2 * RATES.step_s * 1.001 + 2.0, "jerk {grown}");
+            let (before, after) = (*target - last, *target - torque);
+            assert!(before * after >= 0.0 && after.abs() <= before.abs(), "{before} {after}");
             (last, rate) = (torque, now);
             torques.push(torque);
         }
@@ -29,6 +30,10 @@ fn full_torque_takes_the_time_that_slew_and_jerk_say() {
     let torques = follow(&[(1_235.0, 400)]);
     assert_eq!(torques.last(), Some(&1_235.0), "exactly");
     assert!(torques.iter().all(|torque| *torque <= 1_235.0), "no overshoot");
+    // The target stays, so the rate ends as it began; the last step may end a rest of two steps of the jerk.
+    let rates: Vec<f32> = torques.windows(2).map(|pair| (pair[1] - pair[0]) / RATES.step_s).collect();
+    let change = rates.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f32::max);
+    assert!(change <= 2.0 * RATES.jerk_nm_s2 * RATES.step_s * 1.001 + 2.0, "jerk {change}");
     // Torque by slew, and once the time that the slew takes to come and go: 125 ms + 50 ms.
     let reached = torques.iter().position(|torque| *torque >= 1_235.0).unwrap();
     assert!((173..=180).contains(&reached), "{reached} ms");

@@ -276,7 +276,11 @@ fn limits_hold() {
     world.request.torque_nm = 1_000.0;
     world.slots(500);
     assert_eq!(world.output().status.torque_nm, 150.0);
+    // A start backward is motoring, and braking once the rotor turns forward.
     world.request.torque_nm = -1_000.0;
+    world.slots(500);
+    assert_eq!(world.output().status.torque_nm, -150.0);
+    world.observed.omega = 50.0;
     world.slots(500);
     assert_eq!(world.output().status.torque_nm, -90.0);
     // Backward it is the other way round.

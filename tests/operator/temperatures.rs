@@ -178,10 +178,10 @@ fn only_past_the_end_of_derating_it_trips_by_name() {
 #[test]
 fn losses_warm_what_has_no_sensor() {
     let mut world = warm(World::running());
-    world.observed.current_a = 150.0;
+    (world.observed.current_a, world.observed.squares_a2) = (150.0, 1.5 * 150.0 * 150.0);
     world.slots(20_000);
     let Temperatures { winding_c, heat_sink_c, junction_c, .. } = told(&world);
-    let loss_w = 1.5 / 0.913_5 * 0.1 * copper_factor(winding_c) * 150.0 * 150.0;
+    let loss_w = 1.5 * 0.1 * copper_factor(winding_c) * 150.0 * 150.0;
     assert!((winding_c - 60.0 - 4e-3 * loss_w).abs() < 0.2, "{winding_c} °C");
     let device_w = 150.0 * (0.5 * (1.0 + 5e-3 * 150.0) + 1e-3 * world.observed.udc_v);
     assert!((heat_sink_c - 40.0).abs() < 0.1 && (junction_c - heat_sink_c - 0.06 * device_w).abs() < 0.2);
@@ -264,7 +264,7 @@ proptest! {
         let mut state = ThermalState::new();
         for (winding, heat_sink, current_a, map_error) in slots {
             let load =
-                Load { current_a, reference_a: current_a, udc_v: 1_500.0, map_error, max_current_a: 233.0 };
+                Load { current_a, squares_a2: current_a * current_a, reference_a: current_a, udc_v: 1_500.0, map_error, max_current_a: 233.0 };
             for slot in 1..=10 {
                 let (told, failed) = state.step(&load, Ratios { winding, heat_sink }, &THERMAL, SLOT_S);
                 if let Some(Temperatures { winding_c, heat_sink_c, junction_c, torque_share, .. }) = told {

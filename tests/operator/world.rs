@@ -105,11 +105,24 @@ impl World {
     /// One slot.
     pub fn slot(&mut self) -> Output {
         let observed = Observation { at: self.at, report: self.observed };
-        let input = Input { request: &self.request, observed: &observed, feedback: &self.feedback };
+        let input =
+            Input { request: &self.request, observed: &observed, feedback: &self.feedback, fresh: true };
         let output = self.operator.step(&input, &self.settings);
         self.last = Some(output);
         self.react(&output);
         output
+    }
+
+    /// Slots that an idle loop has missed: the world has gone on, and the state machine makes up for its own steps.
+    pub fn missed(&mut self, count: u32) {
+        let before = self.last;
+        (0..count).for_each(|_| self.react(&before.expect("a slot has passed")));
+        let observed = Observation { at: self.at, report: self.observed };
+        for _ in 0..count {
+            let input =
+                Input { request: &self.request, observed: &observed, feedback: &self.feedback, fresh: false };
+            self.operator.step(&input, &self.settings);
+        }
     }
 
     pub fn slots(&mut self, count: u32) {

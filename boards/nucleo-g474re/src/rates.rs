@@ -12,7 +12,7 @@ pub const CORE_HZ: u32 = 170_000_000;
 const COARSEST: u16 = 8;
 
 /// Most cycles that the control interrupt takes, by the upper bound of `docs/cost.md`.
-pub const CONTROL_CYCLES: u32 = 5_210;
+pub const CONTROL_CYCLES: u32 = 5_230;
 
 /// Additional cycles of the control interrupt when it damps a line filter: its 77 instructions, at slightly more than two cycles each.
 pub const DAMPING_CYCLES: u32 = 170;

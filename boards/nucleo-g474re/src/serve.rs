@@ -157,6 +157,14 @@ impl<S: Station> Serve<'_, S> {
         }
     }
 
+    /// Sets the switches. A drive that has not started has switched its chopper off for good; that of any other is on again once no fault is left.
+    pub fn switch(&self, status: &Status, started: bool) {
+        switchgear::set(&self.registers, &status.switches);
+        if started && status.trip.is_none() {
+            switchgear::resume_chopper(&self.registers);
+        }
+    }
+
     /// One pass of the idle loop: takes the frames that have come, and serves the newest slot if not yet served. Says whether it served one.
     pub fn pass(&mut self, slot: &mut Slot, mailboxes: &OperatorMailboxes, rated: &Settings) -> bool {
         self.collect();
@@ -182,7 +190,7 @@ impl<S: Station> OperatorPort<TorqueDemand> for Serve<'_, S> {
     }
 
     fn tell(&mut self, _from: Instant, status: &Status, report: Option<&Report>) {
-        switchgear::set(&self.registers, &status.switches);
+        self.switch(status, report.is_some());
         let frame = self.station.tell(status, report);
         self.say(frame);
     }

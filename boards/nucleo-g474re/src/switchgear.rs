@@ -8,7 +8,7 @@ pub use super::pins::Wires;
 use super::pins::{self, CHOPPER_OFF, Wire, is_high};
 use super::power_stage::CORE_HZ;
 use super::registers::Registers;
-use stm32_metapac::timer::vals;
+use stm32_metapac::timer::{regs, vals};
 use tractive::operator::Switches;
 
 /// Counts of a chopper period.
@@ -46,6 +46,19 @@ pub fn configure(registers: &Registers) {
 /// Switches the chopper off for good: no duty reaches its pin any more.
 pub fn stop_chopper(registers: &Registers) {
     registers.tim17.bdtr().modify(|w| w.set_moe(false));
+}
+
+/// Switches the chopper on again after a break of the chip's own, which keeps the timer's main output off for good; for a drive without a fault. While the
+/// cause lasts, the hardware keeps it off.
+pub fn resume_chopper(registers: &Registers) {
+    let timer = registers.tim17;
+    if !timer.bdtr().read().moe() {
+        // Status flags are cleared by writing 0; writing 1 leaves them alone.
+        let mut all_but_break = regs::Sr1chCmp(u32::MAX);
+        all_but_break.set_bif(0, false);
+        timer.sr().write_value(all_but_break);
+        timer.bdtr().modify(|w| w.set_moe(true));
+    }
 }
 
 /// Sets all switches. From the idle loop only.

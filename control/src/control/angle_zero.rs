@@ -41,11 +41,11 @@ impl AngleZero {
         angle
     }
 
-    /// Learns from a time in which no torque was asked for; `false` if the machine turns too slowly to show anything.
+    /// Learns from a time in which no torque was asked for; `false` if the machine turns too slowly to show anything, or has no magnets to show it.
     #[inline(never)]
     pub fn learn(&mut self, rest: &WithoutTorque) -> bool {
         let WithoutTorque { unexplained_v, omega, max_omega, magnets_wb, length_s } = *rest;
-        let shows = omega.abs() > FROM * max_omega;
+        let shows = omega.abs() > FROM * max_omega && magnets_wb > 0.0;
         if shows {
             // A quarter turn at most: beyond, the sine falls again, and its sign stays right.
             let sine = limit_magnitude(unexplained_v.d / (omega * magnets_wb), 1.0);
@@ -129,8 +129,9 @@ mod tests {
                 length_s: 1e-3,
             };
             let mut zero = AngleZero::NONE;
-            zero.learn(&rest);
+            let shown = zero.learn(&rest);
             assert!(zero.angle().signed_radians().abs() < 1.1 * RATE * 1e-3, "{d} {magnets_wb}");
+            assert!(magnets_wb > 0.0 || !shown && zero == AngleZero::NONE, "{d} {magnets_wb}");
         }
     }
 }

@@ -24,7 +24,8 @@ pub struct LinkWindow {
     pub motoring_full_v: f32,
     /// Link voltage at and below which all braking torque is given, in V; below `braking_none_v`.
     pub braking_full_v: f32,
-    /// Link voltage at and above which a thousandth of it is left, in V.
+    /// Link voltage above which none of it is left, in V: who then brakes is given a thousandth of motoring torque, which takes from the link what
+    /// nothing else does.
     pub braking_none_v: f32,
 }
 
@@ -37,14 +38,19 @@ impl LinkWindow {
         braking_none_v: f32::MAX,
     };
 
-    /// Lowest and highest torque at a link voltage, for a largest torque in N·m and an electrical angular speed.
-    fn bounds_nm(&self, udc_v: f32, largest_nm: f32, omega: f32) -> (f32, f32) {
+    /// Lowest and highest torque at a link voltage, for a largest torque in N·m and an electrical angular speed. Slower than `standing`, torque takes
+    /// power in either direction, for its copper loss: a full link does not let a train roll back.
+    fn bounds_nm(&self, udc_v: f32, largest_nm: f32, omega: f32, standing: f32) -> (f32, f32) {
         let (mut motoring, mut braking) = (largest_nm, largest_nm);
         if udc_v < self.motoring_full_v {
             motoring *= share(udc_v - self.motoring_none_v, self.motoring_full_v - self.motoring_none_v);
         }
-        if udc_v > self.braking_full_v {
-            braking *= share(self.braking_none_v - udc_v, self.braking_none_v - self.braking_full_v);
+        if omega.abs() < standing {
+            braking = motoring;
+        } else if udc_v > self.braking_full_v {
+            let left = self.braking_none_v - udc_v;
+            let share = share(left, self.braking_none_v - self.braking_full_v);
+            braking *= if left < 0.0 { -share } else { share };
         }
         if omega < 0.0 { (-motoring, braking) } else { (-braking, motoring) }
     }
@@ -61,6 +67,10 @@ impl Default for LinkWindow {
 fn share(x: f32, span: f32) -> f32 {
     if x > KEPT_SHARE * span { x / span } else { KEPT_SHARE }
 }
+
+/// Share of the largest speed below which a machine with torque counts as taking power: 30 r/min of 6,000, where 600 N·m give the reference machine's
+/// shaft what its copper takes, `ω T = k T²`.
+const STANDING_SHARE: f32 = 0.005;
 
 /// Share of a torque that the link's window leaves at least.
 const KEPT_SHARE: f32 = 0.001;
@@ -118,10 +128,13 @@ impl Shaper {
         let largest = envelope_nm(input.omega, ratings);
         // The limit by the link is not slewed: the link's capacitor fills in milliseconds. A pattern follows torque towards zero at any rate.
         let (lowest, highest) = match input.window {
-            Some(window) => window.bounds_nm(input.udc_v, largest, input.omega),
+            Some(window) => {
+                let standing = STANDING_SHARE * ratings.max_speed_rad_s * ratings.pole_pairs;
+                window.bounds_nm(input.udc_v, largest, input.omega, standing)
+            }
             None => (-largest, largest),
         };
-        let shaped = limit(shaped, lowest, highest);
+        let shaped = if shaped == 0.0 { 0.0 } else { limit(shaped, lowest, highest) };
         self.torque_nm = Some(shaped);
         shaped
     }
@@ -152,14 +165,20 @@ mod tests {
             (950.0, 50.0, 100.0),
             (1500.0, 100.0, 100.0),
             (1850.0, 100.0, 50.0),
-            (2000.0, 100.0, 0.1),
+            (1900.0, 100.0, 0.1),
+            (2000.0, 100.0, -0.1),
         ] {
-            assert_eq!(window.bounds_nm(udc_v, 100.0, 300.0), (-braking, motoring), "{udc_v} V forward");
-            assert_eq!(window.bounds_nm(udc_v, 100.0, -300.0), (-motoring, braking), "{udc_v} V backward");
-            assert_eq!(window.bounds_nm(udc_v, 100.0, 0.0), (-braking, motoring), "{udc_v} V at rest");
+            let bounds_nm = |omega| window.bounds_nm(udc_v, 100.0, omega, 2.0);
+            for omega in [2.0, 300.0] {
+                assert_eq!(bounds_nm(omega), (-braking, motoring), "{udc_v} V forward");
+                assert_eq!(bounds_nm(-omega), (-motoring, braking), "{udc_v} V backward");
+            }
+            for omega in [-1.9, 0.0, 1.9] {
+                assert_eq!(bounds_nm(omega), (-motoring, motoring), "{udc_v} V at rest");
+            }
         }
         for udc_v in [0.0, 1e6, f32::MAX] {
-            assert_eq!(LinkWindow::OPEN.bounds_nm(udc_v, 100.0, 300.0), (-100.0, 100.0), "{udc_v} V");
+            assert_eq!(LinkWindow::OPEN.bounds_nm(udc_v, 100.0, 300.0, 2.0), (-100.0, 100.0), "{udc_v} V");
         }
     }
 
@@ -203,6 +222,15 @@ mod tests {
             }
             // Less is what the sensors' noise shows without current.
             assert_eq!(begins_nm(sign * 0.005 * ratings.max_torque_nm, false), 0.0);
+        }
+        // On a full link, a two-hundredth of the largest speed decides: 50 electrical rad/s.
+        let window = LinkWindow { braking_full_v: 1_300.0, braking_none_v: 1_400.0, ..LinkWindow::OPEN };
+        for (omega, given_nm) in [(49.0, -500.0), (-49.0, -500.0), (51.0, 1.0), (-51.0, -500.0)] {
+            let demand = Demand { torque_nm: -500.0, slew_limited: false };
+            let (udc_v, flowing_nm, window) = (1_500.0, 0.0, Some(&window));
+            let input =
+                Input { demand: &demand, window, udc_v, omega, flowing_nm, can_step: true, period_s: 1e-4 };
+            assert_eq!(Shaper::new().step(&input, &ratings), given_nm, "{omega}");
         }
     }
 }

@@ -61,6 +61,12 @@ impl Abc {
         Self { a: f32::from_bits(a), b: f32::from_bits(b), c: f32::from_bits(c) }
     }
 
+    /// The sum of the three squares.
+    #[inline]
+    pub fn squares(self) -> f32 {
+        self.a * self.a + self.b * self.b + self.c * self.c
+    }
+
     /// The largest magnitude of the three.
     #[inline]
     pub fn peak(self) -> f32 {

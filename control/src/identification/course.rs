@@ -2,6 +2,7 @@
 
 use super::followed::Followed;
 use super::inductance::Inductance;
+use super::noise::Noise;
 use super::observation::Stage;
 use super::pulses::{Pulses, Region};
 use super::zero::Zero;
@@ -36,6 +37,10 @@ pub struct Course {
     /// Halves since the last guess of the inductance, in [`Stage::Probe`]; and how its currents follow the volt-seconds.
     waited: u32,
     followed: Followed,
+    noise: Noise,
+    /// Current when the voltage of the probe's first pulses was last raised, in A, and their volt-seconds since then, in V·s.
+    from: Dq,
+    fed: Dq,
     pulses: Pulses,
     /// Stator resistance, in ohm, as shown by the staircase.
     resistance_ohm: f32,
@@ -62,19 +67,17 @@ struct Shown {
 
 const NONE: Dq = Dq { d: 0.0, q: 0.0 };
 
-/// Commands without voltage before the first pulse, which show the current sensors' readings without current.
-const QUIET: u32 = 40;
+/// Commands without voltage before the first pulse, which show the current sensors' readings without current: the noise within 6 % (standard error).
+const QUIET: u32 = 120;
 /// Voltage of the first pulse, as a share of the link's largest; the growth to the next one, and the halves until then.
 const FIRST_SHARE: f32 = 0.003;
 const GROWTH: f32 = 1.5;
 const PROBE_HALVES: u32 = 4;
-/// Change of current in a half that is seen above the noise, as a share of the bound.
-const SEEN_SHARE: f32 = 0.015;
-/// Change of current from which something is learnt, likewise.
-const LEARNT_SHARE: f32 = 0.006;
-/// Change of current that counts as noise, likewise.
-const NOISE_SHARE: f32 = 0.01;
-/// The change that a probe wants, likewise; the directions of the probes after the first one seen, the change that they want, likewise, for a
+/// Way of the current under one voltage with which it has moved, over the change that counts as noise; and change from which something is learnt, likewise.
+/// The dead time takes its part of small voltages: with half the way it makes the inductance look several times as large.
+const SEEN: f32 = 3.0;
+const LEARNT: f32 = 0.6;
+/// The change that a probe wants, as a share of the bound; the directions of the probes after the first one seen, the change that they want, likewise, for a
 /// machine without saliency, and their number.
 const PROBE_SHARE: f32 = 0.03;
 const AROUND: [[f32; 2]; 4] = [[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]];
@@ -82,6 +85,8 @@ const AROUND_SHARE: f32 = 0.12;
 const PROBES_AROUND: u32 = 24;
 /// Most commands that are under way when another one comes.
 const LATE: u32 = 3;
+/// Newest boundaries before the first pulse whose changes of current show the noise.
+pub const QUIET_CHANGES: usize = (QUIET - LATE) as usize;
 /// Phase current with a sure direction, likewise.
 const SMALL_SHARE: f32 = 0.01;
 /// The largest change in a half on the way to a direct current, likewise.
@@ -144,6 +149,9 @@ impl Course {
             step: 0,
             waited: 0,
             followed: Followed::NOTHING,
+            noise: Noise::UNKNOWN,
+            from: NONE,
+            fed: NONE,
             pulses: Pulses::new(),
             resistance_ohm: 0.0,
             lacking_v: 0.0,
@@ -201,14 +209,15 @@ impl Course {
         self.zero.turn(back_share, mean.d / bound_a, seen.length_s);
         let drop = self.drop_v(mean, seen.frame);
         let fed = seen.acted - drop * seen.length_s;
-        let learns = change.squared() > (LEARNT_SHARE * bound_a) * (LEARNT_SHARE * bound_a);
+        let least_a = LEARNT * self.noise.change_a();
+        let learns = change.squared() > least_a * least_a;
         if matches!(self.stage, Stage::AlongQ | Stage::AlongBoth) {
             let is_outward = learns && mean.q * fed.q > 0.0;
             self.pulses.went(is_outward, inductance.flux(change).q / fed.q);
         }
         // A current that stands still tells little by its changes.
         if learns && !matches!(self.stage, Stage::Probe | Stage::Rest | Stage::Turn | Stage::Done) {
-            inductance.learn(change, fed, NOISE_SHARE * bound_a);
+            inductance.learn(change, fed, &self.noise);
         }
         let [along_d, along_q] = match self.stage {
             Stage::Done if self.step > 0 => [0.0; 2],
@@ -224,28 +233,35 @@ impl Course {
 
     /// A half of the probe: along d until a current moves, then along both axes.
     fn probe(&mut self, seen: &Seen, change: Dq, inductance: &mut Inductance, bound_a: f32) {
-        let moved = change.squared() > (SEEN_SHARE * bound_a) * (SEEN_SHARE * bound_a);
+        self.fed = self.fed + seen.acted;
+        let (way, seen_a) = (seen.current - self.from, SEEN * self.noise.change_a());
         if self.step > 0 {
             // At first the earlier commands are still on their way.
             if self.commands > LATE {
                 self.followed = self.followed.and(change, seen.acted);
             }
         } else if self.commands <= QUIET {
-            self.waited = 0;
-        } else if moved {
-            // No machine's current goes against its voltage: then the guess by which it has moved is the better one.
-            if change.d * seen.acted.d > 0.0 {
-                inductance.learn(change, seen.acted, NOISE_SHARE * bound_a);
+            if self.commands > LATE {
+                self.noise.shows(change, bound_a);
             }
+            self.waits_from(seen.current);
+        } else if way.squared() > seen_a * seen_a {
+            // Whatever the direction: it may be that of other sensors.
+            inductance.guess(self.fed.length() / way.length());
             inductance.settle(FLOOR_SHARES[0]);
             (self.commands, self.step) = (0, 1);
         } else {
             self.waited += 1;
             if self.waited >= PROBE_HALVES {
                 inductance.scale(GROWTH);
-                self.waited = 0;
+                self.waits_from(seen.current);
             }
         }
+    }
+
+    /// Begins to wait for a current to move from where it is.
+    fn waits_from(&mut self, current: Dq) {
+        (self.from, self.fed, self.waited) = (current, NONE, 0);
     }
 
     /// A half at a direct current.
@@ -339,7 +355,7 @@ impl Course {
         (self.stage, self.commands, self.step) = (stage, 0, 0);
     }
 
-    /// The end, without voltage: currents whose sensors read something else cannot be held.
+    /// The end, without voltage: currents whose sensors read something else, or mostly noise, cannot be held.
     fn refuse(&mut self) {
         self.enter(Stage::Done);
         self.step = 1;
@@ -349,6 +365,13 @@ impl Course {
     fn advance(&mut self, ratings: &Ratings) {
         let after = |limit: u32| self.commands > limit;
         match self.stage {
+            Stage::Probe
+                if self.step == 0
+                    && self.commands == QUIET + 1
+                    && self.noise.is_too_much(ratings.max_current_a) =>
+            {
+                self.refuse();
+            }
             Stage::Probe if self.step > 0 && after(PROBES_AROUND) => {
                 if self.followed.is_machine() {
                     self.enter(Stage::Staircase)

@@ -1,5 +1,6 @@
 //! The incremental inductance where the current is, as the pulses show it.
 
+use super::noise::Noise;
 use crate::frames::{Dq, limit};
 
 /// A symmetric matrix of inductances, in H: 0 along an axis of which nothing is known, and the coupling with q.
@@ -146,15 +147,16 @@ impl Inductance {
         Dq { d: qq * flux.d - dq * flux.q, q: dd * flux.q - dq * flux.d } * (1.0 / determinant)
     }
 
-    /// Learns that a change of current took so much flux linkage; changes of so little, in A, are noise. The matrix moves by the least
-    /// that explains a share of it, the coupling less readily than the rest.
-    pub fn learn(&mut self, change: Dq, flux: Dq, noise_a: f32) {
+    /// Learns that a change of current took so much flux linkage, beside noise. The matrix moves by the least that explains a share of it, the coupling
+    /// less readily than the rest. Noise makes the inductance along d look smaller, which is made up for: where pulses lie
+    /// along q, changes along d are small. Made up for along q too, much saturation took the current to 1.15 of its bound.
+    pub fn learn(&mut self, change: Dq, flux: Dq, noise: &Noise) {
         let left = flux - self.flux(change);
         let (Dq { d, q }, Dq { d: left_d, q: left_q }) = (change, left);
         // With x = (dd, dq, qq) and the coupled share s: flux_d = d x₀ + s q x₁, flux_q = s d x₁ + q x₂.
         let w_s = COUPLING_WEIGHT * self.coupled;
         let w = w_s * self.coupled;
-        let noise = noise_a * noise_a;
+        let (made_up, noise) = (noise.made_up() * GAIN, noise.change_a() * noise.change_a());
         let (a, b, c) = (d * d + w * q * q + noise, w * d * q, w * d * d + q * q + noise);
         let scale = GAIN / (a * c - b * b);
         let (x, y) = ((c * left_d - b * left_q) * scale, (a * left_q - b * left_d) * scale);
@@ -163,7 +165,8 @@ impl Inductance {
             let changed = limit(known + more, LEAST_SHARE * known, MOST_SHARE * known);
             if changed > least { changed } else { least }
         };
-        let (dd, qq) = (own(before.dd, d * x, self.floor_h.d), own(before.qq, q * y, self.floor_h.q));
+        let more_d = d * x + before.dd * made_up / a;
+        let (dd, qq) = (own(before.dd, more_d, self.floor_h.d), own(before.qq, q * y, self.floor_h.q));
         let dq = before.dq + w_s * (q * x + d * y);
         let most = COUPLING * dd * qq;
         let dq = if dq * dq > most { dq * (most / (dq * dq)) } else { dq };
@@ -184,6 +187,13 @@ impl Inductance {
 mod tests {
     use super::*;
 
+    /// Sensors without noise, with which changes of so little, in A, count as such.
+    fn noise(change_a: f32) -> Noise {
+        let mut noise = Noise::UNKNOWN;
+        noise.shows(Dq { d: 0.0, q: 0.0 }, 100.0 * change_a);
+        noise
+    }
+
     #[test]
     fn changes_of_both_axes_show_the_whole_matrix() {
         let mut truth = Inductance::round(1e-3);
@@ -191,7 +201,7 @@ mod tests {
         let mut found = Inductance::round(2e-3);
         let changes = [Dq { d: 4.0, q: 20.0 }, Dq { d: 4.0, q: -20.0 }, Dq { d: 20.0, q: 3.0 }];
         for change in changes.into_iter().cycle().take(120) {
-            found.learn(change, truth.flux(change), 1.0);
+            found.learn(change, truth.flux(change), &noise(1.0));
         }
         let near = |a: f32, b: f32| (a - b).abs() < 0.03 * b.abs();
         let (found_is, truth_is) = (found.here, truth.here);
@@ -208,12 +218,12 @@ mod tests {
         found.at(there, bound_a);
         for _ in 0..20 {
             let change = Dq { d: 0.0, q: 10.0 };
-            found.learn(change, change * 9e-3, 0.1);
+            found.learn(change, change * 9e-3, &noise(0.1));
         }
         found.at(Dq { d: 0.0, q: 0.0 }, bound_a);
         for _ in 0..20 {
             let change = Dq { d: 0.0, q: 10.0 };
-            found.learn(change, change * 1e-3, 0.1);
+            found.learn(change, change * 1e-3, &noise(0.1));
         }
         assert!((found.here.qq - 1e-3).abs() < 1e-5);
         // The other sign of the current along q is its mirror image.
@@ -228,7 +238,7 @@ mod tests {
         let mut found = Inductance::round(2e-3);
         let pulses = |found: &mut Inductance, at: Dq, change: Dq, henry: f32| {
             found.at(at, bound_a);
-            (0..20).for_each(|_| found.learn(change, change * henry, 0.1));
+            (0..20).for_each(|_| found.learn(change, change * henry, &noise(0.1)));
         };
         pulses(&mut found, Dq { d: -80.0, q: 0.0 }, Dq { d: 10.0, q: 0.0 }, 1e-3);
         pulses(&mut found, nowhere, Dq { d: 0.0, q: 10.0 }, 9e-3);

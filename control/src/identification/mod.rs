@@ -4,7 +4,7 @@
 //! wants a certain change of current from each command, finds out which volt-seconds that takes, and tells at each carrier boundary what
 //! acted and what flowed ([`Observation`]). The map is fitted elsewhere.
 //!
-//! 1. **Probe**: pulses along d, longer each time, until a current moves.
+//! 1. **Probe**: nothing at first, which shows the [noise](Noise) of the currents; then pulses along d, longer each time, until a current moves.
 //! 2. **Staircase**: direct currents along d, which give no torque: stator resistance and the inverter's voltage error. If they turn a free
 //!    rotor, the angle's zero is off: a current along q brings the rotor back, and the frame turns until none is needed.
 //! 3. **Pulses** along d, along q, along both: alternating voltages that are reversed when the current would leave the bound at the end
@@ -21,6 +21,7 @@ mod course;
 mod followed;
 mod gathered;
 mod inductance;
+mod noise;
 mod observation;
 mod packed;
 mod pulses;
@@ -37,6 +38,8 @@ use course::{Course, Seen};
 use gathered::Gathered;
 use inductance::Inductance;
 
+pub use course::QUIET_CHANGES;
+pub use noise::{Noise, PROBED_NOISE_SHARE};
 pub use observation::{OBSERVATION_WORDS, Observation, Stage};
 pub use packed::{PACKED_WORDS, Packed, Units};
 

@@ -14,7 +14,8 @@ pub struct SwitchLimits {
     pub min_pulse_ticks: u32,
     /// Dead time between the two devices of a leg, in ticks; the hardware inserts it.
     pub dead_time_ticks: u32,
-    /// Length of the shortest carrier half, in ticks: half a period of the highest switching frequency.
+    /// Length of the shortest carrier half, in ticks: half a period of the highest switching frequency. A half that is locked to the angle may be shorter
+    /// while it makes up for an angle.
     pub shortest_half_ticks: u32,
 }
 
@@ -27,7 +28,7 @@ impl SwitchLimits {
         clock: &Clock,
     ) -> Self {
         // One tick more than the quotient's whole part: never above the highest frequency.
-        let half = (clock.ticks_per_s / (2.0 * max_switching_hz)) as u32 + 1;
+        let half = ((clock.ticks_per_s / (2.0 * max_switching_hz)) as u32).saturating_add(1);
         Self { min_pulse_ticks, dead_time_ticks, shortest_half_ticks: half }
     }
 
@@ -39,7 +40,8 @@ impl SwitchLimits {
     /// as far as timers of 16 bits count, but 4 at least.
     pub const fn longest_half_ticks(&self) -> u32 {
         const COUNTED: u32 = 65_000;
-        let (most, least) = (20 * self.shortest_half_ticks, Self::LEAST_RANGE * self.shortest_half_ticks);
+        let half = self.shortest_half_ticks;
+        let (most, least) = (half.saturating_mul(20), half.saturating_mul(Self::LEAST_RANGE));
         if most < COUNTED {
             most
         } else if least < COUNTED {

@@ -136,24 +136,55 @@ pub fn switch_verdicts(
     ]
 }
 
+/// `true` if a switch goes up the ladder: the number of turn-ons decreases; a free carrier, which counts none, is at its foot. Patterns of as many turn-ons
+/// follow each other in the order of their codes, to a larger modulation index.
+fn is_up(from: Mode, to: Mode) -> bool {
+    let turn_ons = |mode: Mode| mode.turn_ons().wrapping_sub(1);
+    (turn_ons(to), from as u32) < (turn_ons(from), to as u32)
+}
+
 /// Switches that reverse the previous one although neither speed nor demand has gone back in between. At the power limit the demand falls while the
 /// speed rises: that is no cause.
 fn hunts(recording: &Recording) -> usize {
     const SPEED_SHARE: f64 = 0.005;
     const DEMAND_SHARE: f64 = 0.01;
+    // The same from a point at which the demand turned in between.
+    const TURNED_SHARE: f64 = 0.03;
     let counted: Vec<_> = recording.switches.iter().filter(|switch| switch.is_between_pulses()).collect();
     let taken_back = counted.windows(2).filter(|pair| pair[0].from == pair[1].to);
     let without_cause = taken_back.filter(|pair| {
         let between = window(recording, pair[0].t_s, pair[1].t_s);
         let (Some(first), Some(last)) = (between.first(), between.last()) else { return true };
-        // Share by which each has moved in the direction of the second switch. Up the ladder the number of turn-ons decreases; a free carrier, which
-        // counts none, is at its foot.
-        let turn_ons = |mode: Mode| mode.turn_ons().wrapping_sub(1);
-        let sign = if turn_ons(pair[1].to) < turn_ons(pair[1].from) { 1.0 } else { -1.0 };
+        // Share by which each has moved in the direction of the second switch.
+        let sign = if is_up(pair[1].from, pair[1].to) { 1.0 } else { -1.0 };
         let gone = |value: fn(&Row) -> f64| sign * (value(last) / value(first) - 1.0);
         let (speed, demand) = (gone(|row| row.speed_rpm.abs()), gone(|row| row.te_ref_nm));
-        let demand_alone = demand > DEMAND_SHARE && speed > -SPEED_SHARE;
+        let turned = |row: &Row| sign * (last.te_ref_nm / row.te_ref_nm - 1.0);
+        let turned = between.iter().map(turned).fold(demand, f64::max);
+        let has_gone = demand > DEMAND_SHARE || turned > TURNED_SHARE;
+        let demand_alone = has_gone && speed > -SPEED_SHARE;
         speed <= SPEED_SHARE && !demand_alone
     });
     without_cause.count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every mode of a ladder is above those before it, those with equal turn-ons as well.
+    #[test]
+    fn a_switch_goes_up_or_down_the_ladder() {
+        let paper = [Mode::Async, Mode::Sync15, Mode::Sync12, Mode::Mid7, Mode::Mid3, Mode::Square];
+        let patterns = Mode::ALL.into_iter().filter(|mode| mode.is_optimal());
+        let optimal: Vec<_> = [Mode::Async].into_iter().chain(patterns).chain([Mode::Square]).collect();
+        assert!(optimal.len() > 10);
+        for ladder in [&paper[..], &optimal[..]] {
+            for (k, lower) in ladder.iter().enumerate() {
+                for higher in &ladder[k + 1..] {
+                    assert!(is_up(*lower, *higher) && !is_up(*higher, *lower), "{lower:?}, {higher:?}");
+                }
+            }
+        }
+    }
 }

@@ -103,7 +103,7 @@ impl DcSide {
                 let drawn_j = plant.motor.energies.electrical_j - before_j;
                 link.advance(drawn_j, dt_s, line_v(line()));
             }
-            Self::Operated(line) => in_plant(|| plant.advance_on(&mut line.link, legs, dt_s)),
+            Self::Operated(line) => in_plant(|| line.advance(plant, legs, dt_s)),
         }
     }
 

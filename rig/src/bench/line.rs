@@ -2,7 +2,7 @@
 
 use super::switchgear::Held;
 use super::{Switchgear, Tick};
-use crate::plant::{DcLink, DcLinkSettings, Heat, LineFilter, LinkEnergies, LinkSwitches, Plant};
+use crate::plant::{DcLink, DcLinkSettings, Heat, Leg, LineFilter, LinkEnergies, LinkSwitches, Plant};
 use crate::steps::held;
 use crate::trace::{LinkBalance, SlotRow};
 use tractive::operator::{Feedback, Request, Status, Switches};
@@ -62,6 +62,8 @@ pub struct LineSide {
     /// The link itself.
     pub link: DcLink,
     stored_before_j: f64,
+    /// Ripple of the source at present, in V.
+    pub ripple_v: f64,
     plan: LinePlan,
     slot_ticks: Tick,
     gear: Switchgear<Request, f32>,
@@ -84,6 +86,7 @@ impl LineSide {
         Self {
             stored_before_j: link.stored_j(),
             link,
+            ripple_v: 0.0,
             plan,
             slot_ticks: Tick::from(clock.millisecond_periods() * clock.control_ticks),
             gear: Switchgear::new(clock),
@@ -93,6 +96,14 @@ impl LineSide {
             chopper_off: None,
             status: None,
         }
+    }
+
+    /// Lets the plant run on the link for `dt_s`.
+    pub fn advance(&mut self, plant: &mut Plant, legs: [Leg; 3], dt_s: f64) {
+        let smooth_v = self.link.settings.source.voltage_v;
+        self.link.settings.source.voltage_v += self.ripple_v;
+        plant.advance_on(&mut self.link, legs, dt_s);
+        self.link.settings.source.voltage_v = smooth_v;
     }
 
     /// Current in the choke, in A; `None` if there is none.

@@ -44,6 +44,9 @@ impl Bench {
         }
         let t_s = self.time.now_s();
         let (sensors, spoiler) = (&self.sensors, &self.spoiler);
+        if let Some(line) = self.dc.operated_mut() {
+            line.ripple_v = sensors.ripple_v(t_s);
+        }
         let before_j = self.plant.motor.energies.electrical_j;
         self.dc.advance(&mut self.plant, self.inverter.legs(), dt_s, || {
             (sensors.supply_v(t_s), spoiler.supply(t_s))

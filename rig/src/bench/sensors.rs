@@ -227,7 +227,12 @@ impl Sensors {
     /// The voltage of a healthy supply, which is also a stiff link's, in V.
     pub fn supply_v(&self, t_s: f64) -> f64 {
         let passed = self.link_steps.iter().rev().find(|(at_s, _)| t_s >= *at_s);
-        passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + self.converter.ripple_v(t_s)
+        passed.map_or(self.udc_v, |(_, udc_v)| *udc_v) + self.ripple_v(t_s)
+    }
+
+    /// See [`Converter::ripple_v`].
+    pub fn ripple_v(&self, t_s: f64) -> f64 {
+        self.converter.ripple_v(t_s)
     }
 
     /// A link's voltage as converted, in V.

@@ -94,12 +94,13 @@ fn cases(campaign: &Campaign, options: &CampaignOptions) -> Result<Vec<Case>> {
 
 /// Writes and prints the outcomes of the cases; `true` if none is uncaught.
 fn finish(outcomes: &[Outcome], given: serde_json::Value, out: &Path, json: bool) -> Result<bool> {
+    let machine = given["machine"].as_str().map(str::to_owned);
     report::write(outcomes, given, out)?;
     if json {
         let totals = report::SYSTEMS.map(|(system, _)| (system, report::total(outcomes, system)));
         crate::say!("{}", serde_json::to_string(&BTreeMap::from(totals))?);
     } else {
-        crate::say!("{}", report::text(outcomes).trim_start());
+        crate::say!("{}", report::text(outcomes, machine.as_deref()).trim_start());
         crate::say!("report: {}", out.join("report.html").display());
     }
     let lost: Vec<_> = outcomes.iter().filter(|outcome| outcome.verdict == Verdict::Uncaught).collect();

@@ -2,6 +2,7 @@
 
 use crate::files::write_text;
 use crate::identify::Identify;
+use crate::pictures::sheet::number;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -35,12 +36,15 @@ impl Step {
         self.found.insert(name.to_owned(), value);
     }
 
-    /// Notes a number that must lie between two others for the step to pass.
-    pub fn within(&mut self, name: &str, value: f64, [least, most]: [f64; 2]) {
+    /// Notes a number that must lie between two others for the step to pass; `true` if it does.
+    pub fn within(&mut self, name: &str, value: f64, [least, most]: [f64; 2]) -> bool {
         self.find(name, value);
-        if !(least..=most).contains(&value) {
+        let holds = (least..=most).contains(&value);
+        if !holds {
+            let [value, least, most] = [value, least, most].map(number);
             self.fail(format!("{name} is {value}: must be from {least} to {most}"));
         }
+        holds
     }
 
     /// Notes what mends it.

@@ -5,7 +5,9 @@ use super::record::{Record, Step};
 use crate::bench::Wiring;
 use crate::can;
 use crate::folder::write_folder;
-use crate::identify::{CURRENT_SENSORS, Ended, Identify, ROTOR_TURNED, Signs, contents, identified};
+use crate::identify::{
+    CURRENT_NOISE, CURRENT_SENSORS, Ended, Identify, ROTOR_TURNED, Signs, contents, identified,
+};
 use crate::machine::Machine;
 use crate::options::On;
 use crate::scenario::System as _;
@@ -13,6 +15,7 @@ use crate::scenario::traction::{Options, Traction};
 use crate::talk::{self, Lines, System, Talk};
 use anyhow::{Result, bail};
 use core::f64::consts::TAU;
+use tractive::identification::PROBED_NOISE_SHARE;
 use tractive::protection::Fault;
 
 /// A step, and its demands on the person who does it.
@@ -56,9 +59,11 @@ pub const ALL: &[Stage] = &[
 const TORQUE_SHARE: f64 = 0.05;
 const HELD_S: f64 = 0.3;
 const RAMP_S: f64 = 0.1;
-/// Reading without current, as a share of the largest; error of the angle's zero from which it is to be corrected, and the largest with which
+/// Largest offset of a current sensor that the drive takes off by itself, as a share of the largest current: its own bound, beyond which it has the fault
+/// `current_offset`. What the experiment may find left of it; error of the angle's zero from which it is to be corrected, and the largest with which
 /// the machine is identified, in degrees; deviation of the torque from what was asked for, as a share of the largest.
-const REST_SHARE: f64 = 0.02;
+const OFFSET_SHARE: f64 = 0.05;
+const LEFT_SHARE: f64 = 0.02;
 const ZERO_DEG: f64 = 1.0;
 const MOST_ZERO_DEG: f64 = 20.0;
 const RESPONSE_DEG: f64 = 20.0;
@@ -68,6 +73,12 @@ const TORQUE_OFF_SHARE: f64 = 0.02;
 const LEAST_ZERO_DEG: f64 = 2.0;
 /// Name of the drive's fault for currents whose sum is not zero.
 const PHASE_SUM: &str = Fault::PhaseSum.name();
+/// Name of the drive's fault for a current sensor whose offset it does not take off.
+const CURRENT_OFFSET: &str = Fault::CurrentOffset.name();
+const ADVICE_OFFSET: &str = "current sensors: without current they read more than the drive takes off by itself: check their supply, their reference and \
+    the range that the power stage's file states, and that the rotor stands";
+const ADVICE_NOISE: &str = "current sensors: their readings at rest scatter too much to tell a machine by small pulses: screen their leads, and filter or \
+    average what they read";
 const ADVICE_SUM: &str = "current sensors: one or two have the wrong sign, so that what they read does not add up to zero: exchange the leads of \
     one after the other and begin anew";
 const ADVICE_TURNED: &str = "a load turns the rotor; or it is light and swings under the pulses: couple it to what it drives; or its angle counts the wrong way: with the gates off turn the rotor forward, and where \
@@ -120,11 +131,27 @@ fn wiring(commission: &Commission, machine: &Machine, _record: &Record) -> Resul
     let mut step = Step::new("wiring");
     let link_v = largest(&told(&talk, "charged", "link_v"));
     step.within("link_charged_v", link_v, [parameters.dc_link_min_v, parameters.dc_link_max_v]);
-    let [ready, charged] = ["ready", "charged"].map(|state| largest(&told(&talk, state, "current_a")));
-    step.within("current_at_rest_a", ready.max(charged), [0.0, REST_SHARE * parameters.max_current_a]);
+    let read = ["ready", "charged"].map(|state| told(&talk, state, "current_a")).concat();
+    at_rest(&read, parameters.max_current_a, &mut step);
     talk.failures.iter().for_each(|failure| step.fail(failure.clone()));
     fault(&talk, &mut step);
     Ok(step)
+}
+
+/// Judges readings of the largest phase current without current, in A: their mean as an offset, which the drive takes off, and their scatter as noise,
+/// which nobody does.
+fn at_rest(read_a: &[f64], max_current_a: f64, step: &mut Step) {
+    let mean =
+        |of: &dyn Fn(f64) -> f64| read_a.iter().map(|read| of(*read)).sum::<f64>() / read_a.len() as f64;
+    let offset_a = mean(&|read| read);
+    let noise_a = mean(&|read| (read - offset_a).powi(2)).sqrt();
+    if !step.within("current_at_rest_a", offset_a, [0.0, OFFSET_SHARE * max_current_a]) {
+        step.advise(ADVICE_OFFSET.to_owned());
+    }
+    let most_a = f64::from(PROBED_NOISE_SHARE) * max_current_a;
+    if !step.within("current_noise_at_rest_a", noise_a, [0.0, most_a]) {
+        step.advise(ADVICE_NOISE.to_owned());
+    }
 }
 
 fn identification(commission: &Commission, machine: &Machine, _record: &Record) -> Result<Step> {
@@ -136,6 +163,8 @@ fn identification(commission: &Commission, machine: &Machine, _record: &Record) 
             match fault.as_str() {
                 ROTOR_TURNED => step.advise(turned_away(zero_deg)),
                 CURRENT_SENSORS => step.advise(sensors_wrong(wiring)),
+                CURRENT_NOISE => step.advise(ADVICE_NOISE.to_owned()),
+                CURRENT_OFFSET => step.advise(ADVICE_OFFSET.to_owned()),
                 PHASE_SUM => step.advise(ADVICE_SUM.to_owned()),
                 _ => {}
             }
@@ -145,7 +174,7 @@ fn identification(commission: &Commission, machine: &Machine, _record: &Record) 
     };
     step.within("current_answers_voltage_deg", outcome.signs.response_deg, [-RESPONSE_DEG, RESPONSE_DEG]);
     step.within("angle_zero_deg", outcome.signs.zero_deg, [-MOST_ZERO_DEG, MOST_ZERO_DEG]);
-    let offset_a = REST_SHARE * machine.folder.parameters.max_current_a;
+    let offset_a = LEFT_SHARE * machine.folder.parameters.max_current_a;
     step.within("current_offset_a", outcome.offset_a, [0.0, offset_a]);
     advise(&outcome.signs, &mut step);
     outcome.threshold_advice().into_iter().for_each(|advice| step.advise(advice));

@@ -16,11 +16,34 @@ const FAR: f64 = 50.0;
 /// Magnets' flux linkage against d that counts as measurement error, as a share of the largest.
 const AGAINST: f64 = 0.01;
 
-/// Checks that rows reach the largest current, in A, along −d and along q, and zero current along d, except for a share of it.
+/// The units of currents, and the value of each in A.
+const UNITS: [(&str, f64); 3] = [("mA", 1e-3), ("A", 1.0), ("kA", 1e3)];
+
+/// The question about currents that would be right in a unit a thousand times as large as the one stated, or as small; the units' values are in A, and
+/// without a stated one it is A.
+fn unit_question(stated_a: Option<f64>, times: f64) -> String {
+    let near = |unit_a: f64| UNITS.into_iter().find(|(_, size_a)| (size_a / unit_a - 1.0).abs() < 1e-6);
+    let (wanted, stated) = (near(times * stated_a.unwrap_or(1.0)), stated_a.and_then(near));
+    match (wanted, stated) {
+        (Some((unit, _)), None) => format!(": are its currents in {unit} (a head such as id [{unit}])?"),
+        (Some((unit, _)), Some((stated, _))) => {
+            format!(": are its currents in {unit}, and not in {stated} as its head says?")
+        }
+        (None, _) => String::new(),
+    }
+}
+
+/// Checks that rows reach the largest current, in A, along −d and along q, and zero current along d, except for a share of it. The values in A of the units
+/// that the head states for these two currents serve the hint.
 ///
 /// # Errors
 /// The axis that ends too early or is too long, and the unit that is probably wrong.
-pub fn check_ends(rows: &[Sample], most_a: f64, short: f64, path: &Path) -> Result<()> {
+pub fn check_ends(
+    rows: &[Sample],
+    units_a: [Option<f64>; 2],
+    (most_a, short): (f64, f64),
+    path: &Path,
+) -> Result<()> {
     let file = path.display();
     let (mut first, mut last, mut last_q) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
     for [id, iq, ..] in rows.iter().map(|row| row.values) {
@@ -29,11 +52,11 @@ pub fn check_ends(rows: &[Sample], most_a: f64, short: f64, path: &Path) -> Resu
     let short = short * most_a;
     ensure!(first < 0.0, "{file}: id: begins at {first}: must go below 0, with d along the magnets");
     ensure!(last >= -short, "{file}: id: ends at {last}: must reach 0, with d along the magnets");
-    for (ends, what) in [(-first, "−d"), (last_q, "q")] {
+    for ((ends, what), unit_a) in [(-first, "−d"), (last_q, "q")].into_iter().zip(units_a) {
         let hint = match most_a / ends {
-            ratio if ratio > FAR => ": are its currents in kA (a head such as id [kA])?",
-            ratio if ratio < 1.42 => ": if its currents are rms, --rms",
-            _ => "",
+            ratio if ratio > FAR => unit_question(unit_a, 1e3),
+            ratio if ratio < 1.42 => ": if its currents are rms, --rms".to_owned(),
+            _ => String::new(),
         };
         ensure!(
             ends >= most_a - short,
@@ -42,9 +65,10 @@ pub fn check_ends(rows: &[Sample], most_a: f64, short: f64, path: &Path) -> Resu
         );
         ensure!(
             ends <= FAR * most_a,
-            "--max-current {most_a}: must be at least {}: {file} goes to {} along {what}: are its currents in mA (a head such as id [mA])?",
+            "--max-current {most_a}: must be at least {}: {file} goes to {} along {what}{}",
             digits(ends / FAR),
-            digits(ends)
+            digits(ends),
+            unit_question(unit_a, 1e-3)
         );
     }
     Ok(())

@@ -16,8 +16,15 @@ pub struct Column {
     pub quantity: usize,
     /// Peak value in A, Wb or rad of a value of one in the file.
     pub factor: f64,
+    /// Value in A, Wb or rad of the unit that the name says; `None` if it says none.
+    pub unit: Option<f64>,
+}
+
+impl Column {
     /// `true` if the name says the unit.
-    pub has_unit: bool,
+    pub const fn has_unit(&self) -> bool {
+        self.unit.is_some()
+    }
 }
 
 /// Words of a name that carry no information of their own.
@@ -144,7 +151,7 @@ pub fn column(name: &str, rms: bool) -> Result<Option<Column>, String> {
         let is_rms = quantity != ANGLE && said.unwrap_or(rms);
         let factor = if is_rms { size * 2.0_f64.sqrt() } else { size };
         let name = name.trim().trim_matches('"').to_owned();
-        return Ok(Some(Column { name, quantity, factor, has_unit: unit.is_some() }));
+        return Ok(Some(Column { name, quantity, factor, unit: unit.map(|_| size) }));
     }
     Ok(None)
 }

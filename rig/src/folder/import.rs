@@ -4,12 +4,12 @@ use super::axes::{self, GAP, SHORT};
 use super::fitted::fitted;
 use super::given::Given;
 use super::ratings::Ratings;
-use super::reading::Reading;
+use super::reading::{AngleFrom, DAxis, Reading};
 use super::rectangle::Rectangle;
 use super::samples::{Samples, read};
 use super::torque;
 use super::write;
-use crate::options::finite;
+use crate::options::{finite, needs};
 use anyhow::{Result, anyhow, ensure};
 use clap::Args;
 use std::path::PathBuf;
@@ -49,14 +49,18 @@ impl Import {
         self.given.check()?;
         ensure!(self.flux_factor > 0.0, "--flux-factor {}: must be above 0", self.flux_factor);
         let samples = read(&self.map, self.rms)?;
+        let from_d = self.reading.angle_from == AngleFrom::D;
+        let polar = "currents given by magnitude and angle, as columns Is and gamma";
+        needs(&[("--angle-from d", from_d, polar, samples.is_polar)])?;
         let (map, fit) = self.taken(&samples)?;
         let mut ratings = Ratings::of(&map, &self.given)?;
         let fit_line = fit.as_ref().map_or(String::new(), |fit| format!("# {fit}.\n"));
         let comment = format!("# From {}.\n{fit_line}", self.map.display());
         let contents = ratings.contents(&self.given, &self.told(), write::csv(&map, &comment))?;
         write::folder(&self.given.out, &contents)?;
-        let rows = samples.rows.iter().map(|row| (row.values, row.torque_nm));
-        let question = torque::question(rows, self.given.pole_pairs, self.flux_factor);
+        let rows = self.reading.of(&samples, self.flux_factor);
+        let question =
+            torque::question(rows.iter().map(|row| (row.values, row.torque_nm)), self.given.pole_pairs);
         ratings.say(&self.given, &fit.into_iter().chain(question).collect::<Vec<_>>())
     }
 
@@ -81,7 +85,11 @@ impl Import {
         let rows = reading.of(samples, self.flux_factor);
         let grid = Rectangle::of(&rows, &self.map);
         let short = if grid.is_ok() { SHORT } else { GAP };
-        axes::check_ends(&rows, self.given.max_current, short, &self.map)?;
+        let mut units_a = samples.units_a;
+        if reading.d_axis == DAxis::Reluctance {
+            units_a.reverse();
+        }
+        axes::check_ends(&rows, units_a, (self.given.max_current, short), &self.map)?;
         let exact = grid.and_then(|grid| self.exact(&grid)).map(|map| (map, None));
         let (map, fit) = exact.or_else(|reason| {
             let fitted = fitted(&rows, self.given.max_current, |map| self.check(map));

@@ -108,11 +108,7 @@ impl Ratings {
             ("max_current_a", given.max_current, "given; peak"),
             ("max_speed_rpm", given.max_speed_rpm, "given"),
             ("rated_torque_nm", self.rated_torque_nm, "chosen: 0.7 of max_torque_nm"),
-            (
-                "rated_speed_rpm",
-                self.rated_speed_rpm,
-                "chosen: a little above the speed where weakening begins",
-            ),
+            ("rated_speed_rpm", self.rated_speed_rpm, self.rated_speed_from(given)),
             ("zs9_source_v", given.zs9_source.unwrap_or(f64::NAN), "given"),
             (
                 "zs9_link_v",
@@ -131,6 +127,17 @@ impl Ratings {
             ("rotor_inertia_kg_m2", given.inertia.unwrap_or(f64::NAN), "given"),
         ];
         toml(&given.name(), &format!("machine {command}"), &lines)
+    }
+
+    /// The origin of the rated speed.
+    fn rated_speed_from(&self, given: &Given) -> &'static str {
+        if self.corner_rpm >= given.max_speed_rpm {
+            "chosen: max_speed_rpm, up to which nothing is weakened"
+        } else if RATED_SPEED * self.corner_rpm >= given.max_speed_rpm {
+            "chosen: max_speed_rpm, a little above the speed where weakening begins"
+        } else {
+            "chosen: a little above the speed where weakening begins"
+        }
     }
 
     /// Prints a description of the machine, and notes on its map: a few lines, or JSON if requested.

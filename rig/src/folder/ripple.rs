@@ -5,6 +5,7 @@ use crate::bound::Operation;
 use crate::machine::Machine;
 use crate::options::usual_min_pulse_us;
 use tractive::modulation::{Mode, index_limit};
+use tractive::time::Clock;
 
 /// Least margin of the trip above the highest current at full torque, as a share of it: room for steps and changes of mode.
 pub const ROOM: f64 = 0.15;
@@ -38,6 +39,13 @@ fn highest_a(machine: &Machine) -> f64 {
     ends.filter_map(|(udc_v, mode, speed_rpm)| view.peak_a(mode, speed_rpm, udc_v)).fold(0.0, f64::max)
 }
 
+/// The rate of control that the carrier of a machine wants if the usual one is too slow for it, in Hz.
+fn more_control_hz(machine: &Machine) -> Option<u32> {
+    let max_switching_hz = machine.tables.ratings.max_switching_hz;
+    let is_slow = max_switching_hz > Clock::control_hz(max_switching_hz) as f32;
+    is_slow.then(|| max_switching_hz.ceil() as u32)
+}
+
 impl View<'_> {
     /// Highest current of a phase at full torque in a mode, in A, with a link in V; `None` if the mode has no pulses there.
     pub fn peak_a(&self, mode: Mode, speed_rpm: f64, udc_v: f64) -> Option<f64> {
@@ -47,8 +55,11 @@ impl View<'_> {
         let at = self.map.at(id, iq);
         let flux_wb = (at.psi_d_wb, at.psi_q_wb);
         let min_pulse_us = usual_min_pulse_us(self.machine.folder.parameters.max_switching_hz);
-        let samples = Operation { mode, speed_rpm, udc_v, current_a: (id, iq), flux_wb }
-            .samples(min_pulse_us, self.machine)?;
+        let samples = Operation { mode, speed_rpm, udc_v, current_a: (id, iq), flux_wb }.samples(
+            min_pulse_us,
+            more_control_hz(self.machine),
+            self.machine,
+        )?;
         Some(samples.current_a.iter().map(|current| current.abs()).fold(0.0, f64::max))
     }
 }

@@ -24,6 +24,8 @@ pub struct Samples {
     pub rows: Vec<Sample>,
     /// `true` if currents were given as magnitude and angle: then the angle counts from q towards −d.
     pub is_polar: bool,
+    /// Values in A of the units that the head states for id and iq, or for their magnitude; `None` if it states none.
+    pub units_a: [Option<f64>; 2],
 }
 
 /// Largest current in A, flux linkage in Wb, and angle in rad; by quantity.
@@ -80,7 +82,8 @@ pub fn read(path: &Path, rms: bool) -> Result<Samples> {
         let [id, iq] = if is_polar { [-magnitude * sin, magnitude * cos] } else { [id, iq] };
         Sample { line, values: [id, iq, psi_d, psi_q], torque_nm }
     };
-    Ok(Samples { rows: rows.into_iter().map(sample).collect(), is_polar })
+    let units_a = head.current_units_a();
+    Ok(Samples { rows: rows.into_iter().map(sample).collect(), is_polar, units_a })
 }
 
 /// The delimiter in the first line that is not a comment.
@@ -153,18 +156,24 @@ impl Head {
     /// The head with the units in the line below it; `None` if that line holds anything else.
     fn with_units(&self, units: &csv::StringRecord, rms: bool) -> Option<Self> {
         let silent = self.columns.iter().all(|(place, column)| {
-            !column.has_unit && units.get(*place).is_some_and(|unit| unit.parse::<f64>().is_err())
+            !column.has_unit() && units.get(*place).is_some_and(|unit| unit.parse::<f64>().is_err())
         });
         let named = self.cells.iter().enumerate().map(|(place, name)| match units.get(place) {
             Some(unit) if !unit.is_empty() => format!("{name} [{}]", unit.trim_matches(['(', ')', '[', ']'])),
             _ => name.to_owned(),
         });
         let head = silent.then(|| Self::of(named.collect(), rms))?.ok()?;
-        head.columns.iter().all(|(_, column)| column.has_unit).then_some(head)
+        head.columns.iter().all(|(_, column)| column.has_unit()).then_some(head)
     }
 
     fn is_polar(&self) -> bool {
         self.columns.iter().any(|(_, column)| column.quantity == ANGLE)
+    }
+
+    /// Values in A of the units of id and iq.
+    fn current_units_a(&self) -> [Option<f64>; 2] {
+        let quantities = if self.is_polar() { [MAGNITUDE; 2] } else { [0, 1] };
+        quantities.map(|quantity| self.columns.iter().find(|(_, one)| one.quantity == quantity)?.1.unit)
     }
 
     /// A line's number, values and torque.
@@ -187,9 +196,9 @@ impl Head {
             let (field, value) = number(*place, column.factor);
             let (name, largest) = (&column.name, LARGEST[column.quantity]);
             let hint = match column.quantity {
-                2 | 3 if !column.has_unit => format!(" (is the unit another, {name} [mWb]?)"),
+                2 | 3 if !column.has_unit() => format!(" (is the unit another, {name} [mWb]?)"),
                 ANGLE => String::new(),
-                _ if !column.has_unit => format!(" (is the unit another, {name} [mA]?)"),
+                _ if !column.has_unit() => format!(" (is the unit another, {name} [mA]?)"),
                 _ => String::new(),
             };
             ensure!(
@@ -212,7 +221,7 @@ impl Head {
         let most = rows.iter().map(|(_, values, _)| values[ANGLE].abs() / column.factor).fold(0.0, f64::max);
         let name = &column.name;
         ensure!(
-            column.has_unit || most > TAU,
+            column.has_unit() || most > TAU,
             "{name}: at most {most}: must have its unit, as {name} [deg] or {name} [rad]"
         );
         Ok(())

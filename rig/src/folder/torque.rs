@@ -15,23 +15,42 @@ pub fn factor(name: &str) -> Option<f64> {
     sizes.into_iter().find(|(one, _)| known && *one == unit).map(|(_, size)| size)
 }
 
-/// The question to ask if a map's torque differs from that of its flux linkages with this many pole pairs. Rows are currents and flux linkages along d and
-/// q, and the torque; not a number if there is none.
-pub fn question(
-    rows: impl Iterator<Item = ([f64; 4], f64)>,
-    pole_pairs: u32,
-    flux_factor: f64,
-) -> Option<String> {
-    let (mut told, mut made) = (0.0, 0.0);
+/// The question about a torque of the other sign.
+const OPPOSITE: &str =
+    "are its currents, or is its torque, counted as a generator's, or its q axis the other way round";
+
+/// The question to ask if a map's torque differs from that of its flux linkages with this many pole pairs, in size or in sign. Rows are currents in A and
+/// flux linkages in Wb in the project's frame, and the torque in N·m, which may be no number.
+pub fn question(rows: impl Iterator<Item = ([f64; 4], f64)>, pole_pairs: u32) -> Option<String> {
+    let (mut told, mut made, mut same) = (0.0, 0.0, 0.0);
     for ([id, iq, psi_d, psi_q], torque_nm) in rows {
         if torque_nm.is_finite() {
+            let made_nm = 1.5 * f64::from(pole_pairs) * (psi_d * iq - psi_q * id);
             told += torque_nm.abs();
-            made += (1.5 * f64::from(pole_pairs) * flux_factor * (psi_d * iq - psi_q * id)).abs();
+            made += made_nm.abs();
+            same += torque_nm * made_nm;
         }
     }
     let ratio = told / made;
     // The question is not asked either if there is no torque at all.
-    if told == 0.0 || !ratio.is_finite() || (ratio - 1.0).abs() <= DIFFERENT {
+    if told == 0.0 || !ratio.is_finite() {
+        return None;
+    }
+    let size = size_question(ratio);
+    let sign = (same < 0.0).then_some(OPPOSITE);
+    let questions: Vec<_> = sign.into_iter().chain(size).collect();
+    let minus = if same < 0.0 { "−" } else { "" };
+    (!questions.is_empty()).then(|| {
+        format!(
+            "the map's own torque is {minus}{ratio:.2} times that of its currents and flux linkages with {pole_pairs} pole pairs: {}?",
+            questions.join("; and ")
+        )
+    })
+}
+
+/// The question about the ratio of a map's torque to that of its flux linkages; `None` if they agree.
+fn size_question(ratio: f64) -> Option<&'static str> {
+    if (ratio - 1.0).abs() <= DIFFERENT {
         return None;
     }
     let root = 2.0_f64.sqrt();
@@ -42,10 +61,7 @@ pub fn question(
         (0.5, "are its currents and flux linkages peak"),
     ];
     let near = questions.into_iter().find(|(round, _)| (ratio / round - 1.0).abs() <= NEAR);
-    let question = near.map_or("is --pole-pairs right, and --flux-factor", |(_, question)| question);
-    Some(format!(
-        "the map's own torque is {ratio:.2} times that of its currents and flux linkages with {pole_pairs} pole pairs: {question}?"
-    ))
+    Some(near.map_or("is --pole-pairs right, and --flux-factor", |(_, question)| question))
 }
 
 #[cfg(test)]

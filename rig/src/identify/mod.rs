@@ -38,7 +38,7 @@ use clap::Args;
 use serde_json::Map;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tractive::identification::{Observation, Stage};
+use tractive::identification::{Observation, PROBED_NOISE_SHARE, Stage};
 
 /// The options of an identification.
 #[derive(Clone, Debug, Args)]
@@ -105,6 +105,9 @@ fn remedy(fault: &str) -> &'static str {
         ROTOR_TURNED => {
             "; a light rotor swings under the pulses: couple it to what it drives (of a simulated one --inertia); else a load turns it, or its angle is wrong, of which commission tells more"
         }
+        CURRENT_NOISE => {
+            "; the readings of the current sensors at rest scatter too much: screen their leads, or filter or average what they read"
+        }
         _ => "",
     }
 }
@@ -165,8 +168,11 @@ pub const ROTOR_TURNED: &str = "rotor_turned";
 /// The fault of an experiment whose currents do not follow the voltage.
 pub const CURRENT_SENSORS: &str = "current_sensors";
 
+/// The fault of an experiment that does not begin, because the currents are mostly noise.
+pub const CURRENT_NOISE: &str = "current_noise";
+
 /// Observations of an experiment that has run to its end. If its rotor is in the wrong place, because its angle is wrong or a load turns it, it ends
-/// before the rotor is to turn; if its currents respond as no machine's do, it ends after its first pulses.
+/// before the rotor is to turn; if its currents respond as no machine's do, it ends after its first pulses; if they are noise, before these.
 fn complete(observations: Vec<Observation>, bound_a: f64) -> std::result::Result<Vec<Observation>, Ended> {
     let reached = |stage: Stage| observations.iter().any(|observation| observation.stage == stage);
     if reached(Stage::Turn) {
@@ -176,6 +182,14 @@ fn complete(observations: Vec<Observation>, bound_a: f64) -> std::result::Result
         let zero_deg = saliency_deg(&observations, bound_a);
         let (value, limit) = ("more".to_owned(), "5° before it is to turn".to_owned());
         Ended { fault: ROTOR_TURNED.to_owned(), value, limit, zero_deg, wiring: None }
+    } else if !observations.iter().any(response::has_pulse) {
+        let value = format!("{:.3} A", response::noise_a(&observations, bound_a));
+        let limit = format!(
+            "{:.3} A, root mean square of each phase: {:.2} % of max_current_a",
+            f64::from(PROBED_NOISE_SHARE) * bound_a,
+            100.0 * PROBED_NOISE_SHARE
+        );
+        Ended { fault: CURRENT_NOISE.to_owned(), value, limit, zero_deg: None, wiring: None }
     } else {
         let wiring = response::wiring(&observations);
         let value = wiring.map_or_else(|| "as no machine's".to_owned(), |wiring| wiring.to_string());

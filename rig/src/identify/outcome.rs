@@ -3,6 +3,7 @@
 use super::corrected::{offset_a, turned_by, without_offset};
 use super::experiment;
 use super::fit::{Fit, Turning};
+use super::response::noise_a;
 use super::signs::Signs;
 use super::turn::{Rotor, turned_deg};
 use crate::analysis::Figures;
@@ -71,6 +72,8 @@ pub struct Outcome {
     pub rotor: Rotor,
     /// The largest reading of a phase's sensor at zero current, without the part common to all phases, in A.
     pub offset_a: f64,
+    /// The noise of a phase's reading at rest, root mean square, in A.
+    pub noise_a: f64,
     /// The inverter's voltage error of a leg at the mean link voltage, dead time and threshold together, in V, and its standard error.
     pub lacking_v: (f64, f64),
     /// The largest deviation of the turning rotor's flux linkage from that of the pulses' map, over the map's largest flux linkage; and likewise of the
@@ -143,6 +146,7 @@ impl Outcome {
             turning_flux_off: most(&|turning| turning.off_wb(), largest_wb),
             turning_torque_off: most(&|turning| turning.off_nm(pole_pairs), parameters.max_torque_nm),
             offset_a: largest_phase_a(offset),
+            noise_a: noise_a(observations, bound_a),
             pulses_s,
             peak_share: peak_a / bound_a,
             peak_a,
@@ -183,6 +187,7 @@ impl Outcome {
             ("rotor_inertia_kg_m2", self.rotor.inertia_kg_m2),
             ("friction_nm", self.rotor.friction_nm),
             ("current_offset_a", self.offset_a),
+            ("current_noise_a", self.noise_a),
             ("angle_zero_deg", self.signs.zero_deg),
             ("residual_mwb", 1e3 * self.fit.left_wb()),
             ("turning_flux_off_percent", percent(self.turning_flux_off)),

@@ -1,6 +1,7 @@
 //! Injected faults and their times: the part common to both systems here, the kinds of each beside it.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+pub mod network;
 pub mod sensor;
 pub mod traction;
 pub mod zs9;

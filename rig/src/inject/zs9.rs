@@ -1,11 +1,12 @@
 //! Things that go wrong on purpose.
 
+use super::network::{NetworkFault, NetworkSpoiler};
 use super::sensor::{AngleFault, AngleSpoiler, CurrentFault, CurrentSpoiler};
 use super::{ControlFault, GoesWrong, Injected, Injection};
 use std::str::FromStr;
 use tractive::frames::Abc;
 use tractive::ports::{DualDriveCommand, DualSample, MotorDemand, PowerSample};
-use tractive::protection::Fault;
+use tractive::protection::{Fault, LinkLimits};
 
 /// The faults of the ZS9.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -15,9 +16,9 @@ pub enum Kind {
     SourceShort,
     /// The source is cut off: the capacitor behind its contactor feeds the network.
     SourceLost,
-    /// The source falls to 250 V.
+    /// The source falls to 0.625 of its voltage, 250 V of the paper's 400, or below its trip level if that is lower.
     SourceLow,
-    /// The source jumps to 900 V and charges the capacitors.
+    /// The source jumps to 2.25 times its voltage, 900 V of the paper's 400, or above the capacitors' trip level, and charges them.
     SourceHigh,
     /// The upper motor's sensor reports that it has lost the rotor.
     SensorLost1,
@@ -41,6 +42,8 @@ pub enum Kind {
     Current(usize, usize, CurrentFault),
     /// The angle sensor of motor 0 or 1.
     Angle(usize, AngleFault),
+    /// A sensor of the network.
+    Network(NetworkFault),
     /// A gate's order, in the order of [`tractive::nine_switch::GATES`], is stuck, on (true) or off, until the gates are turned off
     /// for good.
     Gate(u8, bool),
@@ -105,6 +108,25 @@ impl FromStr for Injection<Kind> {
     }
 }
 
+/// Levels that an injected fault is measured by.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Levels {
+    /// The upper motor's largest current, in A.
+    pub largest_a: f64,
+    /// Trip level of the source, in V.
+    pub source_min_v: f64,
+    /// The capacitors', in V.
+    pub capacitor_max_v: f64,
+}
+
+impl Levels {
+    /// Of a motor with this largest current, in A, on a link with these limits.
+    pub fn new(largest_a: f64, limits: &LinkLimits) -> Self {
+        let LinkLimits { source_min_v, capacitor_max_v, .. } = *limits;
+        Self { largest_a, source_min_v: source_min_v.into(), capacitor_max_v: capacitor_max_v.into() }
+    }
+}
+
 /// The effect of a fault on the samples.
 #[derive(Clone, Debug, Default)]
 pub struct Spoiler {
@@ -113,13 +135,16 @@ pub struct Spoiler {
     before: Option<DualSample>,
     current: Option<(usize, CurrentSpoiler)>,
     angle: Option<(usize, AngleSpoiler)>,
-    /// The upper motor's largest current, in A.
-    largest_a: f64,
+    network: Option<NetworkSpoiler>,
+    levels: Levels,
 }
 
 /// A low and a high source, over its voltage: 250 and 900 V of 400.
 const LOW: f64 = 0.625;
 const HIGH: f64 = 2.25;
+/// The same over the trip levels of source and capacitors, at most and at least.
+const BELOW: f64 = 0.9;
+const ABOVE: f64 = 1.1;
 /// An overcurrent over a machine's largest current: 200 A of 85.
 const OVER: f64 = 200.0 / 85.0;
 
@@ -127,17 +152,18 @@ const OVER: f64 = 200.0 / 85.0;
 const DRIVER_FAULT_S: f64 = 0.05;
 
 impl Spoiler {
-    /// Spoils from the injection's instant on, for motors of this largest current, in A.
-    pub fn new(injection: Option<Injection<Kind>>, largest_a: f64) -> Self {
-        let (mut current, mut angle) = (None, None);
+    /// Spoils from the injection's instant on, measured by these levels.
+    pub fn new(injection: Option<Injection<Kind>>, levels: Levels) -> Self {
+        let (mut current, mut angle, mut network) = (None, None, None);
         match injection.map(|injection| injection.kind) {
             Some(Kind::Current(motor, phase, fault)) => {
                 current = Some((motor, CurrentSpoiler::new(phase, fault)));
             }
             Some(Kind::Angle(motor, fault)) => angle = Some((motor, AngleSpoiler::new(fault))),
+            Some(Kind::Network(fault)) => network = Some(NetworkSpoiler::new(fault)),
             _ => {}
         }
-        Self { injected: Injected(injection), before: None, current, angle, largest_a }
+        Self { injected: Injected(injection), before: None, current, angle, network, levels }
     }
 
     /// The converters' reading of the phase currents.
@@ -160,8 +186,8 @@ impl Spoiler {
     pub fn source_v(&self, t_s: f64, source_v: f64) -> f64 {
         match self.injected.kind(t_s) {
             Some(Kind::SourceShort) => 1.0,
-            Some(Kind::SourceLow) => LOW * source_v,
-            Some(Kind::SourceHigh) => HIGH * source_v,
+            Some(Kind::SourceLow) => (LOW * source_v).min(BELOW * self.levels.source_min_v),
+            Some(Kind::SourceHigh) => (HIGH * source_v).max(ABOVE * self.levels.capacitor_max_v),
             Some(Kind::SourceSwings(amplitude_v, hz)) => {
                 let since_s = self.injected.since_s(t_s);
                 source_v + amplitude_v * libm::sin(core::f64::consts::TAU * hz * since_s)
@@ -175,6 +201,10 @@ impl Spoiler {
         let before = self.before.replace(*sample).unwrap_or(*sample);
         self.currents(t_s, &mut sample.currents_a);
         let kind = self.injected.kind(t_s);
+        if let Some(network) = &mut self.network {
+            network.read(kind.is_some(), &mut sample.capacitor_v, &mut sample.source_v);
+            sample.inductor_a = network.read_inductor(kind.is_some(), sample.inductor_a);
+        }
         if let Some((motor, sensor)) = &mut self.angle
             && let Some(Some(angle)) = sample.angles.get_mut(*motor)
         {
@@ -207,10 +237,14 @@ impl Spoiler {
     /// Spoils the PWM interrupt's sample.
     pub fn power(&mut self, t_s: f64, sample: &mut PowerSample) {
         self.currents(t_s, &mut sample.currents_a);
+        let broken = self.injected.kind(t_s).is_some();
+        if let Some(network) = &mut self.network {
+            network.read(broken, &mut sample.capacitor_v, &mut sample.source_v);
+        }
         match self.injected.kind(t_s) {
             Some(Kind::Overcurrent) => {
                 let current = &mut sample.currents_a[0].a;
-                *current = ((OVER * self.largest_a) as f32).copysign(*current);
+                *current = ((OVER * self.levels.largest_a) as f32).copysign(*current);
             }
             Some(Kind::LegStuckOn) => sample.gates.off &= !(1 << 4),
             Some(Kind::LegStuckOff) => sample.gates.on &= !(1 << 2),

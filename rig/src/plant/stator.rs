@@ -274,6 +274,24 @@ impl Stator {
         most
     }
 
+    /// The current of a short circuit in steady state at an electrical speed in rad/s, in A: no voltage is left of `R i + jω ψ`. Where the map is linear it
+    /// is `i_d = −ω² L_q ψ_f/(R² + ω² L_d L_q)`, `i_q = −ω R ψ_f/(R² + ω² L_d L_q)`.
+    pub fn short_circuit_a(&self, omega: f64) -> (f64, f64) {
+        const STEPS: u32 = 50;
+        let (mut id, mut iq) = (0.0, 0.0);
+        for _ in 0..STEPS {
+            let at = self.flux(id, iq);
+            let vd = omega * at.psi_q_wb - self.resistance_ohm * id;
+            let vq = -omega * at.psi_d_wb - self.resistance_ohm * iq;
+            let (dd, dq) = (self.resistance_ohm - omega * at.lqd_h, -omega * at.lqq_h);
+            let (qd, qq) = (omega * at.ldd_h, self.resistance_ohm + omega * at.ldq_h);
+            let det = dd * qq - dq * qd;
+            id += (qq * vd - dq * vq) / det;
+            iq += (dd * vq - qd * vd) / det;
+        }
+        (id, iq)
+    }
+
     /// Energy of the field at a current, above that at zero current, in J: `1.5 ∫ i·dψ` along a straight line from zero.
     pub fn field_j(&self, id_a: f64, iq_a: f64) -> f64 {
         // i·dψ = x iᵀ L(x i) i dx, evaluated in the middle of each piece.

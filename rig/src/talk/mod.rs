@@ -28,7 +28,7 @@ use crate::options::{Options, RunOptions};
 use crate::plant::SpeedSource;
 use crate::run::Supervisor;
 use crate::scenario::System as _;
-use crate::scenario::traction::{self, Traction, scaled_link};
+use crate::scenario::traction::{self, Traction, fed_link};
 use crate::scenario::zs9::{self as dual, Zs9};
 use crate::trace::{Recording, name_of};
 use crate::{files, zs9};
@@ -89,7 +89,7 @@ pub(crate) fn with_traction(
     let options = &Traction::filled(options, machine);
     let idle = Request::idle(&machine.tables.ratings);
     // The requests come from the frames, not from here.
-    let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
+    let line = LinePlan::new(fed_link(options, machine), Box::new(move |_| idle));
     let plan = traction::Plan {
         judged_step_s: options.dt.unwrap_or(TRACE_STEP_S),
         speed: SpeedSource::Inertia { inertia_kg_m2, load_nm: 0.0 },

@@ -191,7 +191,7 @@ impl<'a> Words<'a> {
 pub type Command = (&'static str, fn(&mut Words) -> Result<Action>);
 
 /// The ZS9's commands, in place of the PMaSynRM drive's.
-pub const ZS9_COMMANDS: [Command; 5] = [
+pub static ZS9_COMMANDS: [Command; 5] = [
     ("torque NM NM [over SECONDS]", |words| words.torque(2)),
     ("speed RPM RPM [at RPM_PER_SECOND]", |words| words.speed(2)),
     ("load NM NM", |words| words.load(2)),
@@ -203,7 +203,7 @@ pub const ZS9_COMMANDS: [Command; 5] = [
 ];
 
 /// Every command.
-pub const COMMANDS: [Command; 25] = [
+pub static COMMANDS: [Command; 25] = [
     ("enable [with-torque]", |words| words.enable()),
     ("disable", |_| Ok(Action::Disable)),
     ("off on|off", |words| Ok(Action::Off(words.switch()?))),
@@ -240,15 +240,31 @@ pub(super) const SPEED: [f64; 2] = [-16_000.0, 16_000.0];
 /// Highest voltage that a signal carries, in V, likewise.
 pub(super) const MOST_V: f64 = 6_500.0;
 
+/// The ZS9 has no such command.
+const LINK_LIMITS: &str = "link-limits";
+
+/// The word that a command begins with.
+fn word(usage: &str) -> &str {
+    usage.split(' ').next().unwrap_or(usage)
+}
+
+/// The commands of a system.
+fn commands(system: System) -> impl Iterator<Item = &'static Command> {
+    let own: &'static [Command] = if system == System::Zs9 { &ZS9_COMMANDS } else { &[] };
+    let is_replaced = move |usage| {
+        !own.is_empty() && (word(usage) == LINK_LIMITS || own.iter().any(|(own, _)| word(own) == word(usage)))
+    };
+    COMMANDS.iter().filter(move |(usage, _)| !is_replaced(usage)).chain(own)
+}
+
 fn action(name: &str, words: &mut Words, system: System) -> Result<Action> {
-    let own: &[Command] = if system == System::Zs9 { &ZS9_COMMANDS } else { &[] };
-    let known = own.iter().chain(&COMMANDS).find(|(usage, _)| usage.split(' ').next() == Some(name));
-    match known {
-        Some(_) if system == System::Zs9 && name == "link-limits" => {
-            bail!("link-limits: the ZS9 has none; `link` is its voltage")
-        }
+    match commands(system).find(|(usage, _)| word(usage) == name) {
         Some((_, read)) => read(words),
-        None => bail!("{name}: must be one of: {}", COMMANDS.map(|(usage, _)| usage).join(", ")),
+        None if name == LINK_LIMITS => bail!("{name}: the ZS9 has none; `link` is its voltage"),
+        None => {
+            let usages: Vec<_> = commands(system).map(|(usage, _)| *usage).collect();
+            bail!("{name}: must be one of: {}", usages.join(", "))
+        }
     }
 }
 
@@ -342,6 +358,11 @@ mod tests {
             assert!(got(wrong).is_err(), "{wrong}");
         }
         assert!(line("link 667", 1, System::Pmasynrm).is_err());
+        let refused = format!("{:#}", got("push 3").unwrap_err());
+        for command in ["enable", "torque NM NM [over", "link VOLTS", "limits 1|2"] {
+            assert!(refused.contains(command), "{refused}");
+        }
+        assert!(!refused.contains("link-limits") && !refused.contains("torque NM [over"), "{refused}");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::drive::{Gates, PeriodInput, SlotTimer};
 use crate::frames::{Angle, SQRT_3};
 use crate::machine::{Machine, Tables};
 use crate::ports::{ControlPort, Dual, DualDriveCommand, DualReport, DualSample, HardwareBreak, MotorDemand};
-use crate::protection::{self, FailedCheck, Fault, MaskedFaults, SafeState, Trip};
+use crate::protection::{self, BoostWatch, FailedCheck, Fault, MaskedFaults, SafeState, Trip};
 use crate::recorder::{DualRecord, DualState};
 use crate::time::Instant;
 use core::f32::consts::{FRAC_PI_4, TAU};
@@ -29,6 +29,7 @@ pub struct ControlTask<M = &'static Tables, L = Controller<false>> {
     settings: Settings,
     axes: [Axis<L>; 2],
     link: ZSource,
+    boost: BoostWatch,
     /// The results of the last period.
     driven: Driven,
     /// `true` if the upper motor had a new operating point in that period.
@@ -74,6 +75,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             settings,
             axes: [Axis::new(upper), Axis::new(lower)],
             link: ZSource::new(),
+            boost: BoostWatch::REST,
             driven: Driven::NOTHING,
             upper_aims: false,
             filtered_v: None,
@@ -150,9 +152,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             let next = applied.and_then(|applied| applied.next);
             self.pulse(input, &measured, next, port);
         } else {
-            self.axes.iter_mut().for_each(Axis::idle);
-            self.link = ZSource::new();
-            self.driven = Driven::NOTHING;
+            self.idle();
         }
         let deadline_ticks = self.settings.deadline_ticks();
         let late = port.overrun_ticks(now, deadline_ticks);
@@ -177,7 +177,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     fn tell(&mut self, input: Input, gates: Gates, port: &mut impl ControlPort<Dual>, shared: &Shared) {
         let now = self.now.before(self.settings.clock.control_ticks);
         if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, input, gates), self.trip.is_some());
+            recorder.record(self.entry(now, input, gates), self.trip.is_some(), gates == Gates::Pulse);
         }
         if self.operated && self.slots.begins() {
             if input.command.calibrate | self.axes.iter().any(|axis| axis.calibrating) {
@@ -315,6 +315,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let [of_upper, of_lower] = &command.demands;
         let sound = limits.check_link(sample.source_v, sample.capacitor_v).is_none()
             && limits.check_link_reference(command.link_ref_v, sample.source_v).is_none()
+            && sample.inductor_a.is_finite()
             && axis::is_sound(first, upper.omega(), tables)
             && axis::is_sound(second, lower.omega(), tables)
             && check_demand(of_upper).is_none()
@@ -335,7 +336,9 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         let armed = |(fault, _, _): &FailedCheck| !self.masked.has(*fault);
         let mut failed = limits
             .check_link(sample.source_v, sample.capacitor_v)
-            .or_else(|| limits.check_link_reference(command.link_ref_v, sample.source_v));
+            .or_else(|| limits.check_link_reference(command.link_ref_v, sample.source_v))
+            .filter(armed)
+            .or_else(|| inductor_fault(sample.inductor_a));
         for ((axis, measured), demand) in self.axes.iter().zip(measured).zip(&command.demands) {
             failed = failed
                 .filter(armed)
@@ -360,6 +363,13 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         }
     }
 
+    /// A period without pulses.
+    #[inline(always)]
+    fn idle(&mut self) {
+        self.axes.iter_mut().for_each(Axis::idle);
+        (self.link, self.boost, self.driven) = (ZSource::new(), BoostWatch::REST, Driven::NOTHING);
+    }
+
     /// Control laws of motors and link, while pulses are made.
     fn pulse(
         &mut self,
@@ -369,6 +379,10 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         port: &mut impl ControlPort<Dual>,
     ) {
         let Input { sample, command } = input;
+        let duty = self.settings.least_duty(self.driven.duty);
+        let period_s = self.settings.clock.control_s();
+        let boost = self.boost.step(sample.source_v, sample.capacitor_v, duty, period_s);
+        self.check(boost, port);
         let link_v = 2.0 * sample.capacitor_v - sample.source_v;
         let [first, second] = &mut self.axes;
         let ([m1, m2], [d1, d2]) = (measured, &command.demands);
@@ -432,6 +446,11 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.trip = Some(Trip { fault, value, limit, at, safe: SafeState::GatesOff });
         self.acknowledge.entered();
     }
+}
+
+/// The check of an inductor's current: the network's own limit is not known, but a converter that gives nothing is.
+fn inductor_fault(inductor_a: f32) -> Option<FailedCheck> {
+    (!inductor_a.is_finite()).then_some((Fault::NotFinite, inductor_a, f32::MAX))
 }
 
 /// The check of a demand: any finite number is one, which the envelope limits.

@@ -128,6 +128,15 @@ impl Settings {
         [source_v, 2.0 * ratings.dc_link_max_v - source_v, 2.0 * ratings.dc_link_nominal_v - source_v]
     }
 
+    /// The least shoot-through that the pulses of a duty have: in each carrier period two dead times of those that are told are missing, and as much as
+    /// the longest one for those that are not.
+    #[inline]
+    pub const fn least_duty(&self, duty: f32) -> f32 {
+        let missing_ticks = DEAD_TIME_S * self.clock.ticks_per_s + 2.0 * self.dead_time_ticks as f32;
+        let least = duty - missing_ticks / self.carrier_ticks as f32;
+        if least > 0.0 { least } else { 0.0 }
+    }
+
     /// Instant of the first PWM interrupt, in ticks: the first peak.
     pub const fn first_peak_ticks(&self) -> u32 {
         self.carrier_ticks / 2

@@ -335,7 +335,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
     ) {
         let now = seen.now;
         if let Some(recorder) = shared.recorder {
-            recorder.record(self.entry(now, input, pulsing), self.trip.is_some());
+            recorder.record(self.entry(now, input, pulsing), self.trip.is_some(), pulsing);
         }
         if self.operated && self.slots.begins() {
             shared.operator.tell(now, &self.report(input.sample));
@@ -360,6 +360,7 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
             trip: self.trip,
             udc_v: sample.udc_v,
             current_a: sample.currents_a.peak(),
+            squares_a2: sample.currents_a.squares(),
             speed_known: self.controller.speed_is_known(),
             acknowledged: self.acknowledge.answered(),
             mode: self.mode,

@@ -54,8 +54,12 @@ impl SixStepExit {
         }
     }
 
-    /// A control period without pulses: no torque, and no side.
+    /// A control period without pulses: no torque, and no side. What the voltage was filled to is kept while torque changes its sign; for pulses that
+    /// begin later, at another speed, it means nothing.
     pub(super) fn rest(&mut self, period_s: f32) {
+        if !self.crosses() {
+            *self = Self::new();
+        }
         self.side_nm = 0.0;
         self.crossing_s -= period_s;
     }

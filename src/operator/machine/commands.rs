@@ -28,7 +28,8 @@ impl<D: Demands> Operator<D> {
             self.charge(settings);
         }
         if enable && !last.enable {
-            self.enable(request, &levels, input, settings);
+            let asks_torque = D::asks_torque(request, &observed.report, settings.ratings);
+            self.enable(&levels, asks_torque, input, settings);
         }
         if calibrate && !last.calibrate {
             self.calibrate();
@@ -61,7 +62,8 @@ impl<D: Demands> Operator<D> {
 
     fn follow(&mut self, phase: Phase) {
         self.phase = phase;
-        self.refusal = None;
+        // A value that is still wrong stays named.
+        self.refusal = self.bad_values;
     }
 
     fn acknowledge(&mut self, input: &Situation, settings: &Settings) {
@@ -89,8 +91,8 @@ impl<D: Demands> Operator<D> {
         self.follow(Phase::Fault { trip, asked: Some(0) });
     }
 
-    fn enable(&mut self, request: &D::Request, levels: &Levels, input: &Situation, settings: &Settings) {
-        match self.why_not_enable(request, levels, input, settings) {
+    fn enable(&mut self, levels: &Levels, asks_torque: bool, input: &Situation, settings: &Settings) {
+        match self.why_not_enable(levels, asks_torque, input, settings) {
             Some(reason) => self.refuse(reason),
             None => self.follow(Phase::Pulsing),
         }
@@ -98,8 +100,8 @@ impl<D: Demands> Operator<D> {
 
     fn why_not_enable(
         &self,
-        request: &D::Request,
         levels: &Levels,
+        asks_torque: bool,
         input: &Situation,
         settings: &Settings,
     ) -> Option<Refusal> {
@@ -128,7 +130,7 @@ impl<D: Demands> Operator<D> {
             ),
             (self.bad_values == Some(Refusal::RequestNotFinite), Refusal::RequestNotFinite),
             (health::resting_current(input, settings).is_some(), Refusal::CauseStillPresent),
-            (D::asks_torque(request) && !levels.with_torque, Refusal::TorqueNotZero),
+            (asks_torque && !levels.with_torque, Refusal::TorqueNotZero),
         ];
         refusals.into_iter().find_map(|(refused, reason)| refused.then_some(reason))
     }
@@ -136,7 +138,7 @@ impl<D: Demands> Operator<D> {
     /// The zero is calibrated while the level is set and the drive is enabled without torque; here it is only said if it is not at the beginning.
     fn calibrate(&mut self) {
         match self.state() {
-            State::Enabled => self.refusal = None,
+            State::Enabled => self.refusal = self.bad_values,
             State::Running => self.refuse(Refusal::TorqueNotZero),
             _ => self.refuse(Refusal::NotEnabled),
         }

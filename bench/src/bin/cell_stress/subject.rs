@@ -125,7 +125,7 @@ pub static BURST_SUBJECTS: [Subject; 4] = [
 fn release_and_freeze(counts: &Counts) {
     counts.publish(|m| {
         RING.release();
-        (1..=RING_RECORDS).for_each(|number| RING.record(*m, number == RING_RECORDS));
+        (1..=RING_RECORDS).for_each(|number| RING.record(*m, number == RING_RECORDS, false));
     });
 }
 

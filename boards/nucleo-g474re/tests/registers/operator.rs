@@ -12,11 +12,12 @@ use nucleo_g474re::registers::Registers;
 use nucleo_g474re::serve::{Identifying, Serve, Station};
 use nucleo_g474re::{Control, Pwm, hardware, switchgear};
 use stm32_metapac::gpio;
+use stm32_metapac::timer::regs::Sr1chCmp;
 use tractive::experiment::Memory;
 use tractive::modulation::{CarrierHalf, Mode};
 use tractive::operator::{Configuration, Feedback, State, Status, Switches};
 use tractive::ports::{ControlPort, PwmPort};
-use tractive::protection::{Fault, SafeState};
+use tractive::protection::{Fault, SafeState, Trip};
 use tractive::protocol::{CanEndpoint, EXPERIMENT};
 use tractive::thermal::Ratios;
 use tractive::time::Instant;
@@ -75,6 +76,39 @@ fn each_switch_has_its_pin_and_the_chopper_its_duty() {
     for (chopper, counts) in [(0.25, 250), (1.0, 1_000), (0.0, 0)] {
         switchgear::set(&registers, &Switches { chopper, ..Switches::default() });
         assert_eq!(registers.tim17.ccr(0).read().ccr(), counts);
+    }
+}
+
+/// The chip's own break, of a supply that dips, takes TIM17's main output: it comes back with the acknowledge, not before, and not in a drive that has
+/// refused to start.
+#[test]
+fn the_chopper_is_on_again_once_no_fault_is_left() {
+    let registers = Bench::started(devices()).registers;
+    let state = PositionState::new();
+    let station = CanEndpoint::new(&BUILT_IN.ratings);
+    let serve = Serve::new(registers, Can::CHIP, station, &state, Configuration::Good);
+    let status = |trip| Status {
+        state: State::Ready,
+        trip,
+        refusal: None,
+        refusals: 0,
+        torque_nm: 0.0,
+        switches: Switches::default(),
+        temperatures: None,
+    };
+    let timer = registers.tim17;
+    timer.bdtr().modify(|w| w.set_moe(false));
+    let trip = Trip {
+        fault: Fault::ClockFailure,
+        value: 0.0,
+        limit: 0.0,
+        at: Instant(0),
+        safe: SafeState::GatesOff,
+    };
+    for (trip, started, on) in [(Some(trip), true, false), (None, false, false), (None, true, true)] {
+        timer.sr().write_value(Sr1chCmp(u32::MAX));
+        serve.switch(&status(trip), started);
+        assert_eq!((timer.bdtr().read().moe(), !timer.sr().read().bif(0)), (on, on), "{trip:?} {started}");
     }
 }
 

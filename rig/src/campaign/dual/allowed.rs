@@ -62,6 +62,7 @@ impl Drive {
             }
             // The currents are produced all the same, so only the voltage tells, and its volt-seconds have to add up.
             Cause::Bench(Kind::SourceSwitchOpen) if seen.names(Fault::VoltageUnexplained) => STAGES.end_s,
+            Cause::Bench(Kind::Network(_)) => NETWORK_S,
             Cause::Bench(Kind::Gate(..)) => STUCK_S,
             Cause::Bench(Kind::Control(ControlFault::Stopped)) => carriers_s + STALE_S,
             Cause::Runaway(_) => carriers_s + TRACKING_S,
@@ -72,6 +73,8 @@ impl Drive {
 
 /// Time until a stuck gate has made a difference to the feedback, in s: five carriers.
 const STUCK_S: f64 = 5e-4;
+/// Time until a voltage that is a quarter off is found, in s: the duty rises on it, and the watch takes a mean over 20 ms; or a capacitor is overcharged.
+const NETWORK_S: f64 = 0.025;
 /// The largest age of a command, in s.
 const STALE_S: f64 = 5e-4;
 /// The speed tracker's lag, in s: 2/4000 rad/s.

@@ -1,6 +1,7 @@
 //! The faults of the ZS9.
 
 use crate::campaign::fault::{BENT, Faults, Named, SensorErrors, UNFELT};
+use crate::inject::network::NetworkFault;
 use crate::inject::sensor::{AngleFault, CurrentFault};
 use crate::inject::zs9::Kind;
 use tractive::nine_switch::GATES;
@@ -44,6 +45,8 @@ pub fn faults() -> Vec<Named<Cause>> {
     const CURRENT: &[Fault] = &[Fault::Overcurrent];
     list.add("flux-20%-more", Cause::Flux(1.2), CURRENT, Some(ANOTHER_MACHINE), true);
     list.add("flux-20%-less", Cause::Flux(0.8), CURRENT, Some(ANOTHER_MACHINE), true);
+    // At the end: a case's place decides the instant of its fault.
+    network(&mut list);
     list.0
 }
 
@@ -92,6 +95,27 @@ fn source(list: &mut Faults<Cause>) {
     list.add("source-switch-open", Kind::SourceSwitchOpen, OPEN, Some(UNFELT), true);
     list.add("capacitors-halved", Kind::CapacitorsHalved, HIGH, Some(UNFELT), true);
     list.add("link-out-of-range", Kind::LinkOutOfRange, &[Fault::DutyRange], None, true);
+}
+
+/// The network's sensors.
+fn network(list: &mut Faults<Cause>) {
+    const LOW: &[Fault] = &[Fault::LinkImplausible];
+    // The current loop drives the inductors blindly, and overcharges the capacitors.
+    const BLIND: &[Fault] = &[Fault::CapacitorOvervoltage];
+    for (what, fault, names, share) in [
+        ("capacitor-75%", NetworkFault::CapacitorScaled(0.75), LOW, None),
+        // Less than what dead times that nobody tells may hide, and far from the trip level.
+        ("capacitor-90%", NetworkFault::CapacitorScaled(0.9), LOW, Some(BENT)),
+        // As long as nothing changes, the duty is right.
+        ("capacitor-frozen", NetworkFault::CapacitorFrozen, LOW, Some(UNFELT)),
+        ("source-125%", NetworkFault::SourceScaled(1.25), LOW, None),
+        ("source-75%", NetworkFault::SourceScaled(0.75), LOW, Some(UNFELT)),
+        ("inductor-dead", NetworkFault::InductorDead, BLIND, None),
+        ("inductor-reversed", NetworkFault::InductorReversed, BLIND, None),
+        ("inductor-not-finite", NetworkFault::InductorNotFinite, &[Fault::NotFinite], None),
+    ] {
+        list.add(&format!("network-{what}"), Kind::Network(fault), names, share, true);
+    }
 }
 
 /// Gates, legs, and what watches them.

@@ -36,7 +36,7 @@ impl Part {
 
     fn text(self, outcomes: &[Outcome]) -> String {
         if self == Self::Tables {
-            return text(outcomes);
+            return text(outcomes, None);
         }
         let mut out = String::new();
         for (system, heading) in SYSTEMS {

@@ -21,6 +21,14 @@ use std::path::Path;
 /// The systems, with their headings.
 pub const SYSTEMS: [(&str, &str); 2] = [("pmasynrm", "PMaSynRM drive"), ("zs9", "ZS9")];
 
+/// The systems with the headings of a campaign: of another machine than the papers', its folder is named.
+fn headings(machine: Option<&str>) -> [(&'static str, String); 2] {
+    let name = machine.and_then(|folder| Path::new(folder).file_name()?.to_str());
+    SYSTEMS.map(|(system, heading)| {
+        (system, name.map_or_else(|| heading.to_owned(), |name| format!("{heading} with {name}")))
+    })
+}
+
 /// The number of cases, by their end.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Tally {
@@ -71,10 +79,10 @@ impl Outcome {
     }
 }
 
-/// Everything as text.
-pub fn text(outcomes: &[Outcome]) -> String {
+/// Everything as text; of the papers' machines, or of the one in a folder.
+pub fn text(outcomes: &[Outcome], machine: Option<&str>) -> String {
     let mut out = String::new();
-    for (system, heading) in SYSTEMS {
+    for (system, heading) in headings(machine) {
         let of: Vec<_> = outcomes.iter().filter(|outcome| outcome.system == system).cloned().collect();
         let Some(total) = total(&of, system) else { continue };
         let _ = writeln!(out, "\n### {heading}\n\n{}", sentences(&total));
@@ -94,6 +102,7 @@ pub fn write(outcomes: &[Outcome], options: serde_json::Value, out: &Path) -> Re
     let bytes = writer.into_inner().map_err(|error| error.into_error())?;
     write_text(&out.join("campaign.csv"), &String::from_utf8(bytes)?)?;
     let totals = SYSTEMS.map(|(system, _)| (system.to_owned(), serde_json::json!(total(outcomes, system))));
+    let machine = options["machine"].as_str().map(str::to_owned);
     let summary = serde_json::json!({
         "scenario": "campaign",
         "version": env!("CARGO_PKG_VERSION"),
@@ -103,13 +112,13 @@ pub fn write(outcomes: &[Outcome], options: serde_json::Value, out: &Path) -> Re
         "uncaught": outcomes.iter().filter(|outcome| outcome.verdict == Verdict::Uncaught).collect::<Vec<_>>(),
     });
     write_text(&out.join("summary.json"), &(serde_json::to_string_pretty(&summary)? + "\n"))?;
-    write_text(&out.join("report.html"), &page(outcomes)?)
+    write_text(&out.join("report.html"), &page(outcomes, machine.as_deref())?)
 }
 
-fn page(outcomes: &[Outcome]) -> Result<String> {
+fn page(outcomes: &[Outcome], machine: Option<&str>) -> Result<String> {
     let mut page = Page::new("campaign", "what faults come to");
     let mut figures = Figures::default();
-    for (system, heading) in SYSTEMS {
+    for (system, heading) in headings(machine) {
         let of: Vec<_> = outcomes.iter().filter(|outcome| outcome.system == system).cloned().collect();
         let Some(total) = total(&of, system) else { continue };
         let stopped = |value: fn(&Outcome) -> f64| {

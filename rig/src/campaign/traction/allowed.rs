@@ -2,16 +2,17 @@
 
 use super::cases::Case;
 use super::faults::Cause;
-use super::{Drive, STAGES, sensors};
+use super::{Drive, Last, STAGES, sensors};
 use crate::bench::Observed;
 use crate::campaign::judge::{Bounded, CURRENT_SHARE, FORCED, half_turn_s};
 use crate::campaign::outcome::{Allowed, Seen};
 use crate::inject::traction::Kind;
+use crate::plant::Stator;
 use core::f64::consts::TAU;
 use tractive::protection::{Fault, SafeState};
 
 impl Drive {
-    pub(super) fn allowed(&self, case: &Case, seen: &Seen, safe_torque_nm: f64) -> Allowed {
+    pub(super) fn allowed(&self, case: &Case, seen: &Seen, last: Last) -> Allowed {
         let parameters = &self.machine.folder.parameters;
         let observed = &seen.observed;
         let flaws = &case.conditions.flaws;
@@ -25,9 +26,7 @@ impl Drive {
             // The flux linkage present when a device fails cannot leave a shorted machine; nothing that the gates do is better.
             Cause::Bench(Kind::Device(_)) => most_a.max(FORCED * observed.stored.short_circuit_a),
             // Nor can the flux linkage of magnets that alone drive more than the trip level through a short circuit.
-            _ if self.most_rpm().is_some()
-                && seen.trip.is_some_and(|trip| trip.safe != SafeState::GatesOff) =>
-            {
+            _ if self.most_rpm().is_some() && is_shorted(seen) => {
                 most_a.max(FORCED * observed.stored.short_circuit_a)
             }
             _ => most_a,
@@ -48,7 +47,11 @@ impl Drive {
                     over_v + self.link_rise_v(capacitance_f),
                 ),
                 Bounded::new("V with safe gates", observed.after.udc_v, udc_v),
-                Bounded::new("N·m with safe gates", safe_torque_nm.abs(), self.safe_torque_limit_nm(case)),
+                Bounded::new(
+                    "N·m with safe gates",
+                    last.torque_nm.abs(),
+                    self.safe_torque_limit_nm(case, seen, last.speed_rpm),
+                ),
             ],
             went_on: vec![
                 Bounded::new("A", observed.until.current_a, BETWEEN_SAMPLES * trip_a),
@@ -85,14 +88,35 @@ impl Drive {
         }
     }
 
-    /// The most torque that safe gates may leave, in N·m: a tenth of the largest, so that nobody is braked unasked. A stuck leg leaves no
-    /// such choice, and the short circuit's torque peaks at a few per cent of the speed.
-    fn safe_torque_limit_nm(&self, case: &Case) -> f64 {
+    /// The most torque that safe gates may leave at a speed in r/min, in N·m: a tenth of the largest, so that nobody is braked unasked. A stuck leg
+    /// leaves no such choice, and the short circuit's torque peaks at a few per cent of the speed. Where the EMF leaves no safe state but the short
+    /// circuit, it is what that forces on the machine, if that is more.
+    fn safe_torque_limit_nm(&self, case: &Case, seen: &Seen, speed_rpm: f64) -> f64 {
+        let usual_nm = 0.1 * self.machine.folder.parameters.max_torque_nm;
         match case.fault.cause {
             // A line that goes on falling after the gates are off finally drops below the EMF.
             Cause::Bench(Kind::Gate(..) | Kind::Device(_) | Kind::Supply(_)) => f64::INFINITY,
-            _ => 0.1 * self.machine.folder.parameters.max_torque_nm,
+            _ if is_shorted(seen) && self.must_be_shorted(case, speed_rpm) => {
+                usual_nm.max(FORCED * self.short_circuit_nm(case, speed_rpm))
+            }
+            _ => usual_nm,
         }
+    }
+
+    /// `true` if the drive's rule for the safe state leaves no other at a speed in r/min. A drive that has lost the angle may choose it elsewhere, too.
+    fn must_be_shorted(&self, case: &Case, speed_rpm: f64) -> bool {
+        let nominal_v = self.machine.folder.parameters.dc_link_nominal_v;
+        let link_share = case.conditions.line_v.map_or(1.0, |line_v| line_v / nominal_v);
+        speed_rpm.abs() > SHORTED_FROM * link_share.min(1.0) * self.rectifying_rpm()
+    }
+
+    /// The torque by which the case's machine brakes in a short circuit at a speed in r/min, in N·m: that of steady state. The flux linkage from before
+    /// decays with L/R, which is a few turns wherever this torque exceeds a tenth: over before the torque is averaged, but for the margin.
+    fn short_circuit_nm(&self, case: &Case, speed_rpm: f64) -> f64 {
+        let stator = Stator::new(&self.machine.folder, &case.machine());
+        let omega = speed_rpm * TAU / 60.0 * f64::from(self.machine.folder.parameters.pole_pairs);
+        let (id_a, iq_a) = stator.short_circuit_a(omega);
+        stator.torque_nm(id_a, iq_a).abs()
     }
 
     /// The rise of the link between a sample at the trip level and safe gates, in V.
@@ -121,6 +145,13 @@ impl Drive {
     }
 }
 
+/// `true` if the safe state is a short circuit.
+fn is_shorted(seen: &Seen) -> bool {
+    seen.trip.is_some_and(|trip| trip.safe != SafeState::GatesOff)
+}
+
+/// Share of the speed at which the diodes begin to rectify from which on the drive shorts the machine.
+const SHORTED_FROM: f64 = 0.9;
 /// The speed tracker's lag, in s: 2/500 rad/s.
 const TRACKING_S: f64 = 4e-3;
 /// The largest current between two samples of which neither is above the trip level, as a ratio to that level.

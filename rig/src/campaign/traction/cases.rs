@@ -8,6 +8,7 @@ use crate::campaign::action::{LEAD_S, fault_s};
 use crate::campaign::fault::Named;
 use crate::inject::sensor::AngleFault;
 use crate::inject::traction::Kind;
+use crate::plant::PlantSettings;
 
 /// A speed, and the share of the torque envelope that is demanded there.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +86,15 @@ impl Case {
     /// The name that a filter searches.
     pub fn name(&self) -> String {
         format!("pmasynrm {} {} {}", self.fault.name, self.point.speed_rpm, self.action.name())
+    }
+
+    /// The true machine of the case, as it deviates from its folder.
+    pub(super) fn machine(&self) -> PlantSettings {
+        let (flux_scale, resistance_scale) = match self.fault.cause {
+            Cause::Machine(flux_scale, resistance_scale) => (flux_scale, resistance_scale),
+            _ => (self.conditions.flux_scale, self.conditions.resistance_scale),
+        };
+        PlantSettings { flux_scale, resistance_scale, ..PlantSettings::default() }
     }
 
     /// The highest speed of the rotor as prescribed for the case, in r/min.

@@ -158,7 +158,7 @@ impl Drive {
             speed_rpm: case.point.speed_rpm,
             action: case.action,
         };
-        let allowed = self.allowed(case, &seen, last_torque_nm(rows));
+        let allowed = self.allowed(case, &seen, Last::of(rows));
         let mut modes: Vec<Mode> = rows.iter().map(|row| row.mode).collect();
         modes.dedup();
         Ok((Outcome::new(&setting, &case.fault, &seen, allowed), Way { modes, region: region.get() }))
@@ -207,27 +207,15 @@ impl Drive {
             let at = |t_s: f64| (LEAD_S + t_s, point.speed_rpm + rpm_s * (t_s - at_s));
             if rpm_s == 0.0 { vec![(0.0, point.speed_rpm)] } else { vec![at(-LEAD_S), at(STAGES.end_s)] }
         };
-        let machine = PlantSettings {
-            flux_scale: conditions.flux_scale,
-            resistance_scale: conditions.resistance_scale,
-            ..PlantSettings::default()
-        };
         let faster = |rpm_s: f64| {
             let end_rpm = point.speed_rpm + rpm_s * (STAGES.end_s - at_s);
             vec![(LEAD_S + at_s, point.speed_rpm), (LEAD_S + STAGES.end_s, end_rpm)]
         };
-        let (kind, machine, speed) = match case.fault.cause {
-            Cause::Bench(kind) if case.fault.needs_rest() => {
-                (kind, machine, faster(PUSH_RPM_S * self.scale.speed))
-            }
-            Cause::Bench(kind) => (kind, machine, steady()),
-            Cause::Machine(flux_scale, resistance_scale) => (
-                Kind::Elsewhere,
-                PlantSettings { flux_scale, resistance_scale, ..PlantSettings::default() },
-                steady(),
-            ),
-            Cause::Runaway => (Kind::Elsewhere, machine, faster(RUNAWAY_RPM_S * self.scale.speed)),
-            Cause::Sensor(..) => (Kind::Elsewhere, machine, steady()),
+        let (kind, speed) = match case.fault.cause {
+            Cause::Bench(kind) if case.fault.needs_rest() => (kind, faster(PUSH_RPM_S * self.scale.speed)),
+            Cause::Bench(kind) => (kind, steady()),
+            Cause::Runaway => (Kind::Elsewhere, faster(RUNAWAY_RPM_S * self.scale.speed)),
+            Cause::Machine(..) | Cause::Sensor(..) => (Kind::Elsewhere, steady()),
         };
         let settings = bench::Settings {
             injection: Some(Injection { kind, at_s }),
@@ -249,7 +237,7 @@ impl Drive {
             ..self.bench_settings(STAGES.end_s, TRACE_STEP_S)
         };
         let settings = bench::Settings { udc_v: conditions.line_v.unwrap_or(settings.udc_v), ..settings };
-        let plant = Plant::new(&self.machine.folder, SpeedSource::profile(speed), &machine);
+        let plant = Plant::new(&self.machine.folder, SpeedSource::profile(speed), &case.machine());
         Bench::new(plant, Box::new(operator), &settings)
     }
 }
@@ -262,10 +250,20 @@ fn torque_error_nm(rows: &[Row], before_s: f64) -> f64 {
     (sum / count.max(1.0)).abs()
 }
 
-/// Mean torque over the last half of the aftermath, in N·m.
-fn last_torque_nm(rows: &[Row]) -> f64 {
-    let end_s = rows.last().map_or(0.0, |row| row.t_s);
-    let window = rows.iter().filter(|row| row.t_s > end_s - 0.5 * STAGES.aftermath_s);
-    let (count, sum) = window.fold((0.0_f64, 0.0), |(count, sum), row| (count + 1.0, sum + row.te_nm));
-    sum / count.max(1.0)
+/// Means over the last half of the aftermath.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    /// Torque, in N·m.
+    torque_nm: f64,
+    /// Speed, in r/min.
+    speed_rpm: f64,
+}
+
+impl Last {
+    fn of(rows: &[Row]) -> Self {
+        let end_s = rows.last().map_or(0.0, |row| row.t_s);
+        let window = || rows.iter().filter(|row| row.t_s > end_s - 0.5 * STAGES.aftermath_s);
+        let mean = |of: fn(&Row) -> f64| window().map(of).sum::<f64>() / (window().count() as f64).max(1.0);
+        Self { torque_nm: mean(|row| row.te_nm), speed_rpm: mean(|row| row.speed_rpm) }
+    }
 }

@@ -1,7 +1,7 @@
 //! Cases of the temperature sensors: the operator reads these sensors, so only these cases run with an operator.
 
 use super::cases::Case;
-use super::{Drive, TRACE_STEP_S, last_torque_nm};
+use super::{Drive, Last, TRACE_STEP_S};
 use crate::bench::{self, Bench, Limits, LinePlan, Observed, Simulated, Supply};
 use crate::campaign::Outcome;
 use crate::campaign::action::Action;
@@ -65,7 +65,7 @@ impl Drive {
         let seen = Seen { observed, trip, torque_error_nm: f64::NAN, tick_s, carrier_s };
         let (speed_rpm, action) = (case.point.speed_rpm, case.action);
         let setting = Setting { system: "pmasynrm", mode: mode.name(), speed_rpm, action };
-        let allowed = self.allowed(case, &seen, last_torque_nm(rows));
+        let allowed = self.allowed(case, &seen, Last::of(rows));
         Ok(Outcome::new(&setting, &case.fault, &seen, allowed))
     }
 

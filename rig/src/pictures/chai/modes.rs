@@ -47,10 +47,15 @@ pub fn strategy(recording: &Recording, machine: &Machine) -> Result<String> {
     draw((860, 400), &[panel])
 }
 
-/// A mode's pulses for a share of six-step.
+/// A mode's pulses for a share of six-step, with the control rate that goes with the machine.
 pub fn pulses(machine: &Machine, mode: Mode, f1_hz: f64, share: f64) -> Result<Vec<LegEdge>> {
+    edges(&wanted(machine, mode, f1_hz, share))
+}
+
+/// The same before they are made.
+fn wanted(machine: &Machine, mode: Mode, f1_hz: f64, share: f64) -> Wanted {
     let udc_v = machine.folder.parameters.dc_link_nominal_v;
-    let wanted = Wanted {
+    Wanted {
         mode,
         voltage_v: share * udc_v * FRAC_2_PI,
         udc_v,
@@ -59,8 +64,8 @@ pub fn pulses(machine: &Machine, mode: Mode, f1_hz: f64, share: f64) -> Result<V
         dead_time_us: 0.0,
         min_pulse_us: usual_min_pulse_us(machine.folder.parameters.max_switching_hz),
         max_switching_hz: machine.tables.ratings.max_switching_hz,
-    };
-    edges(&wanted)
+        control_hz: None,
+    }
 }
 
 /// A leg's level over the pulse angle in degrees.
@@ -80,10 +85,10 @@ pub fn drawn_share(mode: Mode) -> f64 {
     1.0 - 0.05 * f64::from(mode.turn_ons() - 1)
 }
 
-/// Figure 7: the legs' levels of a middle-60° mode; the legs' middle 60° are shaded.
-pub fn middle60(machine: &Machine, mode: Mode) -> Result<Panel> {
+/// Figure 7: the legs' levels of a middle-60° mode, with control at a rate in Hz or at the usual one; the legs' middle 60° are shaded.
+pub fn middle60(machine: &Machine, control_hz: Option<u32>, mode: Mode) -> Result<Panel> {
     let (f1_hz, share) = (100.0, drawn_share(mode));
-    let edges = pulses(machine, mode, f1_hz, share)?;
+    let edges = edges(&Wanted { control_hz, ..wanted(machine, mode, f1_hz, share) })?;
     let title =
         format!("{}: {} pulses a turn, at {:.0} % of six-step", mode.name(), mode.turn_ons(), 100.0 * share);
     let (x, y) = (Axis::turn("pulse angle in degrees"), Axis::of("", -0.2, 4.3).bare());
@@ -102,7 +107,7 @@ pub fn middle60(machine: &Machine, mode: Mode) -> Result<Panel> {
 
 /// Figure 7: seven and three pulses.
 pub fn figure7(machine: &Machine) -> Result<String> {
-    let mut panels = [middle60(machine, Mode::Mid7)?, middle60(machine, Mode::Mid3)?];
+    let mut panels = [middle60(machine, None, Mode::Mid7)?, middle60(machine, None, Mode::Mid3)?];
     panels[1].place.1 = 270.0;
     draw((860, 530), &panels)
 }

@@ -1,5 +1,6 @@
 //! The Z-source network.
 
+use crate::plant::legs::LONGEST_STEP_S;
 use tractive_tablegen::Parameters;
 
 /// Two equal inductors and two equal capacitors, crosswise between source and bridge.
@@ -33,6 +34,12 @@ impl ZNetwork {
             resistance_ohm: parameters.zs9_resistance_ohm,
             capacitance_f: parameters.zs9_capacitance_f,
         }
+    }
+
+    /// The quickest oscillation and the quickest decay that the plant's steps resolve: the least product of inductance and capacitance, in H·F, and the
+    /// largest resistance, in ohm.
+    pub fn resolved(&self) -> (f64, f64) {
+        (LONGEST_STEP_S * LONGEST_STEP_S, self.inductance_h / LONGEST_STEP_S)
     }
 
     /// Rates of change, in A/s and V/s, with `feed_v` across the source's side and `bridge_a` into the bridge:

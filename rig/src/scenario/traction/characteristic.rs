@@ -81,7 +81,7 @@ impl Scenario<Traction> for Characteristic {
         let truth = true_machine(options, machine);
         let beside = slots(machine).into_iter().map(|slot| {
             let window = (slot.ends_s - MEASURE_S, slot.ends_s);
-            bound::beside(recording, window, options, &truth)
+            bound::beside(recording, window, options.pulse_limits(&truth), &truth)
         });
         let beside: Vec<_> = beside.flatten().collect();
         let mut figures = analysis::common(recording);
@@ -110,9 +110,9 @@ impl Scenario<Traction> for Characteristic {
         for slot in slots(machine) {
             let title = format!("{} r/min, {} N·m", slot.speed_rpm, slot.torque_nm);
             let window = (slot.ends_s - MEASURE_S, slot.ends_s);
-            spectrum::draw(page, recording, (&title, window), options, &truth);
+            spectrum::draw(page, recording, (&title, window), options.pulse_limits(&truth), &truth);
         }
-        figures::draw(page, recording, &points(recording, machine), machine);
+        figures::draw(page, recording, &points(recording, machine), options.own.control_hz, machine);
     }
 }
 

@@ -4,6 +4,7 @@
 use super::line::{self, within};
 use super::prelude::*;
 use super::scaled::{emf_v, of_rated_rpm};
+use super::setup::udc_v;
 use crate::bench::LinePlan;
 use tractive::machine::Ratings;
 use tractive::operator::Request;
@@ -89,11 +90,11 @@ fn stretches(recording: &Recording, machine: &Machine) -> Vec<Stretch> {
 }
 
 impl Scenario<Traction> for Chopper {
-    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+    fn plan(&self, options: &Options, machine: &Machine) -> Plan {
         let fast = self.speed.unwrap_or(of_rated_rpm(FAST_RPM, machine));
         let slow = fast * SLOW_RPM / FAST_RPM;
         // An EMF near the link's voltage would charge it, so such a machine turns only once the main contactor is closed.
-        let near = emf_v(fast, machine) > NEAR * machine.folder.parameters.dc_link_nominal_v;
+        let near = emf_v(fast, machine) > NEAR * udc_v(options, machine);
         let begins = near.then_some([(TURNS.0, 0.0), (TURNS.1, fast)]).into_iter().flatten();
         let later = [
             (1.0, fast),
@@ -106,7 +107,7 @@ impl Scenario<Traction> for Chopper {
         ];
         let speed = begins.chain(later).collect();
         let ratings = &machine.tables.ratings;
-        let link = line::scaled(machine);
+        let link = line::fed(options, machine);
         let ohm = link.chopper_ohm;
         let line = LinePlan {
             starts_charged: true,

@@ -3,7 +3,7 @@
 use super::host::{bench, truth};
 use super::plan::STEP_S;
 use super::setup::{setup, tasks};
-use super::{Options, PatternsName, Plan, drives, scaled_link};
+use super::{Options, PatternsName, Plan, drives, fed_link};
 use crate::bench::{Bench, LinePlan};
 use crate::inject::Injection;
 use crate::inject::sensor::CurrentFault;
@@ -120,7 +120,7 @@ pub fn drive_commanded(
     let options = &held(options)?;
     let idle = operator::Request::idle(&machine.tables.ratings);
     // The requests come in frames, not from here.
-    let line = LinePlan::new(scaled_link(machine), Box::new(move |_| idle));
+    let line = LinePlan::new(fed_link(options, machine), Box::new(move |_| idle));
     let plan = Plan {
         speed: stand.rotor(),
         injection: stand.injection(machine),

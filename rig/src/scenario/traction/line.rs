@@ -1,5 +1,7 @@
 //! Parts and verdicts that all scenarios with a line side share.
 
+use super::Options;
+use super::setup::udc_v;
 use crate::analysis::Figures;
 use crate::machine::Machine;
 use crate::plant::{DcLinkSettings, Source};
@@ -156,6 +158,12 @@ pub fn plots(page: &mut Page, recording: &Recording) {
 
 fn switched(on: Option<bool>) -> f64 {
     f64::from(u8::from(on.unwrap_or(false)))
+}
+
+/// The line side's link of a run: a machine's, behind a source of the voltage that the options name.
+pub fn fed(options: &Options, machine: &Machine) -> DcLinkSettings {
+    let link = scaled(machine);
+    DcLinkSettings { source: Source { voltage_v: udc_v(options, machine), ..link.source }, ..link }
 }
 
 /// The line side's link for a machine, with the same shares of its voltage and power as the reference machine has.

@@ -79,11 +79,21 @@ fn sagged(source_v: f64, machine: &Machine) -> f64 {
     ((source_v - none_v) / (full_v - none_v)).clamp(0.0, 1.0)
 }
 
+/// The power of full torque on the shaft at the highest speed, in W.
+fn shaft_w(machine: &Machine) -> f64 {
+    let fast = scaled_rpm(FAST_RPM, machine);
+    machine.envelope_nm(fast) * fast * core::f64::consts::TAU / 60.0
+}
+
 /// The largest power that full braking returns to the line, in W: the shaft's power less the copper loss of the largest current.
 fn most_returned_w(machine: &Machine) -> f64 {
-    let (parameters, fast) = (&machine.folder.parameters, scaled_rpm(FAST_RPM, machine));
-    let copper_w = 1.5 * parameters.stator_resistance_ohm * parameters.max_current_a.powi(2);
-    machine.envelope_nm(fast) * fast * core::f64::consts::TAU / 60.0 - copper_w
+    shaft_w(machine) - largest_copper_w(machine)
+}
+
+/// The copper loss of the largest current, in W.
+fn largest_copper_w(machine: &Machine) -> f64 {
+    let parameters = &machine.folder.parameters;
+    1.5 * parameters.stator_resistance_ohm * parameters.max_current_a.powi(2)
 }
 
 impl Scenario<Traction> for LineLimits {
@@ -107,20 +117,27 @@ impl Scenario<Traction> for LineLimits {
         let taken = largest(recording, MOTORS, line_a) / allowed_a;
         let given = largest(recording, BRAKES, |row| -line_a(row) * row.udc_v) / f64::from(train.braking_w);
         let rises_nm = largest(recording, (MOTORS.0, RISES.0), |row| row.te_nm);
-        // If the copper takes much of the braking power, its limit is out of reach.
+        // A line that has sagged, and a copper loss near the limit's power, leave less than the largest torque from the start.
+        let started_w = allowed_a * udc_v(options, machine);
+        let starts_freely =
+            allowed_a >= f64::from(train.motoring_a) && 1.1 * largest_copper_w(machine) < started_w;
+        // A limit beyond the power that full torque takes is out of reach.
+        let motoring_reached = (shaft_w(machine) / started_w).min(1.0);
+        // If the copper takes much of the braking power, its limit is out of reach; if it takes all of it, none comes back.
         let reached = (most_returned_w(machine) / f64::from(train.braking_w)).min(1.0);
+        let used = (reached > 0.0).then(|| reached / given.max(0.0));
         let most = bound(options, 1.02, 1.05);
         let mut verdicts = line::verdicts(recording, &[]);
         verdicts.extend([
             Verdict::never("drive tripped", recording.trip().is_some()),
             Verdict::at_most("line current motoring over its limit", taken, most),
-            Verdict::at_most("that limit over what is used of it", taken.recip(), 1.06),
+            Verdict::at_most("that limit over what is used of it", motoring_reached / taken, 1.06),
             Verdict::at_most("line power braking over its limit", given, most),
-            Verdict::at_most("that limit over what is used of it", reached / given, 1.06),
+            Verdict::at_most("that limit over what is used of it", used, 1.06),
             Verdict::at_most(
                 "torque missing where no limit is reached (share)",
                 1.0 - rises_nm / machine.folder.parameters.max_torque_nm,
-                if allowed_a < f64::from(train.motoring_a) { f64::INFINITY } else { 0.02 },
+                if starts_freely { 0.02 } else { f64::INFINITY },
             ),
         ]);
         line::figures(&mut figures, recording);

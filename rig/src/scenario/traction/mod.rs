@@ -34,7 +34,7 @@ pub(super) mod timing;
 pub(super) mod wheel;
 
 pub use ablated::Part;
-pub use line::scaled as scaled_link;
+pub use line::{fed as fed_link, scaled as scaled_link};
 pub use live::{Command, Live, Start, Turning, Wanted};
 pub use options::{Options, PatternsName, StartName, TractionOptions};
 pub use plan::Plan;
@@ -45,7 +45,8 @@ use super::System;
 use crate::analysis::{self, Figures};
 use crate::law::LawName;
 use crate::machine::Machine;
-use crate::options::{On, usual_min_pulse_us, within};
+use crate::options::{On, needs, usual_min_pulse_us, within};
+use crate::plant::SpeedSource;
 use crate::report::{self, Page};
 use crate::run::Supervisor;
 use crate::run::traction::run_in_qemu;
@@ -58,6 +59,19 @@ use serde_json::{Map, Value};
 use setup::{clock, control_hz, setup, udc_v};
 use tractive::control::{Controller, PiLaw};
 use tractive::wire;
+
+/// The line filter that damping is for.
+const DAMPED: &str = "--line, or a scenario's own line, whose filter needs damping";
+
+/// The check that the true machine has the iron loss of which `--iron-loss` is a share; `--real` asks for all flaws that a machine can have.
+fn check_iron(options: &Options, machine: &Machine) -> Result<()> {
+    let flaws = &options.own.flaws;
+    if flaws.real || flaws.iron_loss == 0.0 {
+        return Ok(());
+    }
+    let loss_w = truth(options, machine)?.folder.parameters.loss_rated_w;
+    needs(&[("--iron-loss", true, "loss_rated_w in the machine.toml of the true machine", loss_w > 0.0)])
+}
 
 /// The PMaSynRM drive.
 #[derive(Clone, Copy, Debug)]
@@ -138,6 +152,8 @@ impl System for Traction {
             bail!("--drives {}: needs --line, and runs on the host alone", options.own.drives);
         }
         options.own.flaws.check(machine)?;
+        options.own.check_needs(options.law)?;
+        check_iron(options, machine)?;
         options.check_flaws(machine, udc_v)
     }
 
@@ -152,8 +168,12 @@ impl System for Traction {
         machine: &Machine,
         supervisor: Option<&mut dyn Supervisor>,
     ) -> Result<Recording> {
+        let free = matches!(plan.speed, SpeedSource::Inertia { .. });
+        needs(&[("--friction", options.own.friction != 0.0, "a free rotor, as of start", free)])?;
         let mut plan = plan.behind(options.own.line);
         let setup = setup(&plan, options, machine, supervisor.is_some());
+        let undamped = options.own.ablate == Some(Part::Damping);
+        needs(&[("--ablate damping", undamped, DAMPED, setup.behind_line_filter)])?;
         let machines = (machine, &truth(options, machine)?);
         let beside = beside(&mut plan, &setup, options, machines)?;
         let bench = bench(plan, &setup, options, machines);

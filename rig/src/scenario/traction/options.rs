@@ -3,10 +3,13 @@
 use super::ablated::Part;
 use super::flaws::{Beside, Filled, FlawOptions};
 use crate::bench::Wiring;
+use crate::bound::PulseLimits;
+use crate::law::LawName;
 use crate::machine::Machine;
-use crate::options::{finite, not_negative};
+use crate::options::{finite, needs, not_negative};
 use crate::plant::LineFilter;
 use crate::run::ticks;
+use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use tractive::control::MtpaStart;
@@ -166,6 +169,31 @@ impl TractionOptions {
         if self.current_filter_known { ticks(self.current_filter_us + self.flaws.mean_skew_us()) } else { 0 }
     }
 
+    /// The check that no option goes without the one that gives it a meaning. The error names both.
+    pub(super) fn check_needs(&self, law: LawName) -> Result<()> {
+        let flaws = &self.flaws;
+        let has = |value: f64| value != 0.0;
+        let (filtered, early) = (has(self.current_filter_us), flaws.adc_skew_us.is_some());
+        let late = has(self.angle_late_us) || has(flaws.angle_jitter_us);
+        needs(&[("--mtpa-start", self.mtpa_start != StartName::Previous, "--law pi", law == LawName::Pi)])?;
+        if flaws.real {
+            return Ok(());
+        }
+        needs(&[
+            ("--angle-late-known", self.angle_late_known, "--angle-late-us or --angle-jitter-us", late),
+            (
+                "--current-filter-known",
+                self.current_filter_known,
+                "--current-filter-us or --adc-skew-us",
+                filtered || early,
+            ),
+            ("--iron-loss-known", self.iron_loss_known, "--iron-loss", has(flaws.iron_loss)),
+            ("--device-drop-known", flaws.device_drop_known, "--device-drop", flaws.device_drop.is_some()),
+            ("--angle-1f-phase-deg", has(flaws.angle_1f_phase_deg), "--angle-1f-deg", has(self.angle_1f_deg)),
+            ("--angle-2f-phase-deg", has(flaws.angle_2f_phase_deg), "--angle-2f-deg", has(self.angle_2f_deg)),
+        ])
+    }
+
     /// Share of the iron loss that the drive is told, in thousandths.
     pub(super) fn known_iron_permille(&self, machine: &Machine) -> u32 {
         let known = if self.iron_loss_known {
@@ -179,6 +207,14 @@ impl TractionOptions {
 
 /// Options of a run.
 pub type Options = crate::options::Options<TractionOptions>;
+
+impl Options {
+    /// The limits of a run's pulses on a machine.
+    pub fn pulse_limits(&self, machine: &Machine) -> PulseLimits {
+        let min_pulse_us = self.min_pulse_us(machine.folder.parameters.max_switching_hz);
+        PulseLimits { min_pulse_us, control_hz: self.own.control_hz }
+    }
+}
 
 /// The options with everything that `--real` stands for.
 pub(super) fn filled(options: &Options, machine: &Machine) -> Options {

@@ -3,6 +3,7 @@
 use super::line::{self, within};
 use super::prelude::*;
 use super::scaled::{emf_v, of_rated_rpm};
+use super::setup::udc_v;
 use crate::bench::LinePlan;
 use crate::plant::profile_speed;
 use crate::steps::held;
@@ -73,16 +74,16 @@ fn refusals(machine: &Machine) -> [&'static str; 6] {
 }
 
 impl Scenario<Traction> for Precharge {
-    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+    fn plan(&self, options: &Options, machine: &Machine) -> Plan {
         let ratings = &machine.tables.ratings;
-        let line = LinePlan::new(line::scaled(machine), Box::new(|t_s| request(t_s, ratings)));
+        let line = LinePlan::new(line::fed(options, machine), Box::new(|t_s| request(t_s, ratings)));
         Plan::operated(DURATION_S, speed(machine), line)
     }
 
-    fn figures(&self, recording: &Recording, _options: &Options, machine: &Machine) -> Figures {
+    fn figures(&self, recording: &Recording, options: &Options, machine: &Machine) -> Figures {
         let mut figures = analysis::common(recording);
         let closes_s = recording.slots.iter().find(|slot| slot.status.switches.main).map(|slot| slot.t_s);
-        let source_v = line::scaled(machine).source.voltage_v;
+        let source_v = udc_v(options, machine);
         let gap_v = closes_s.map_or(f64::NAN, |closes_s| {
             let at = recording.rows.partition_point(|row| row.t_s < closes_s);
             source_v - recording.rows.get(at).map_or(0.0, |row| row.udc_v)

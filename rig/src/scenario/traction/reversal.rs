@@ -67,6 +67,6 @@ impl Scenario<Traction> for Reversal {
         let end_s = BEGIN_S + HOLD_S;
         let window = (end_s - 0.5 * HOLD_S, end_s);
         let truth = true_machine(options, machine);
-        spectrum::draw(page, recording, ("full power", window), options, &truth);
+        spectrum::draw(page, recording, ("full power", window), options.pulse_limits(&truth), &truth);
     }
 }

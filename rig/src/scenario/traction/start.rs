@@ -3,10 +3,9 @@
 
 use super::line::{self, within};
 use super::prelude::*;
-use super::setup::udc_v;
 use crate::bench::{Encoder, LinePlan};
 use crate::options::number;
-use crate::plant::{DcLinkSettings, Source, SpeedSource};
+use crate::plant::SpeedSource;
 use crate::steps::held;
 use crate::verdict::bound;
 use tractive::machine::Ratings;
@@ -86,12 +85,10 @@ fn backward_deg(recording: &Recording) -> f64 {
 impl Scenario<Traction> for Start {
     fn plan(&self, options: &Options, machine: &Machine) -> Plan {
         let (ratings, parameters) = (&machine.tables.ratings, &machine.folder.parameters);
-        let link = line::scaled(machine);
-        let source = Source { voltage_v: udc_v(options, machine), ..link.source };
         let line = LinePlan {
             starts_charged: true,
             ..LinePlan::new(
-                DcLinkSettings { source, ..link },
+                line::fed(options, machine),
                 Box::new(|t_s| Torque::of(ratings).request(t_s, ratings)),
             )
         };

@@ -51,7 +51,8 @@ impl Scenario<Traction> for Steady {
         let measured = distortion::of_recording(recording, window, &machine.folder);
         figures.set("harmonics", measured.harmonics());
         let truth = true_machine(options, machine);
-        let beside: Vec<_> = bound::beside(recording, window, options, &truth).into_iter().collect();
+        let beside: Vec<_> =
+            bound::beside(recording, window, options.pulse_limits(&truth), &truth).into_iter().collect();
         let mut verdicts = bound::verdicts(&beside, options).to_vec();
         if options.own.line.is_some() {
             let swing = analysis::link_swing(analysis::window(recording, window.0, window.1));
@@ -90,7 +91,7 @@ impl Scenario<Traction> for Steady {
         page.zoom("steady state", recording, window);
         let window = (SETTLE_S, SETTLE_S + MEASURE_S);
         let truth = true_machine(options, machine);
-        spectrum::draw(page, recording, ("steady state", window), options, &truth);
+        spectrum::draw(page, recording, ("steady state", window), options.pulse_limits(&truth), &truth);
     }
 }
 

@@ -91,7 +91,7 @@ impl Scenario<Traction> for Sweep {
         if let Some(end) = recording.rows.iter().rev().find(hold) {
             let (title, window) = (format!("{fastest:.0} r/min"), (end.t_s - 0.5 * HOLD_S, end.t_s));
             let truth = true_machine(options, machine);
-            spectrum::draw(page, recording, (&title, window), options, &truth);
+            spectrum::draw(page, recording, (&title, window), options.pulse_limits(&truth), &truth);
         }
     }
 }

@@ -67,7 +67,7 @@ fn request(t_s: f64, torque_nm: f32, ratings: &Ratings) -> Request {
 }
 
 impl Scenario<Traction> for Timing {
-    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+    fn plan(&self, options: &Options, machine: &Machine) -> Plan {
         let to_rpm = self.to.unwrap_or(of_rated_rpm(TO_RPM, machine));
         let turn = to_rpm.signum();
         let (mut speed, mut t_s) = (Vec::new(), if self.operated { OPERATED_S } else { 0.0 });
@@ -92,7 +92,7 @@ impl Scenario<Traction> for Timing {
         let freeze_s = self.freeze_at.unwrap_or(f64::INFINITY);
         let duration_s = t_s.min(fault_s.min(freeze_s) + AFTER_FAULT_S);
         Plan {
-            line: self.operated.then(|| self.line(machine)),
+            line: self.operated.then(|| self.line(options, machine)),
             freeze_at_s: self.freeze_at,
             injection: self.offset_at.map(|at_s| {
                 let fault = CurrentFault::Offset(OFFSET * machine.folder.parameters.max_current_a);
@@ -108,10 +108,10 @@ impl Scenario<Traction> for Timing {
 }
 
 impl Timing {
-    fn line(&self, machine: &Machine) -> LinePlan {
+    fn line(&self, options: &Options, machine: &Machine) -> LinePlan {
         let ratings = &machine.tables.ratings;
         let torque_nm = if self.brake { -ratings.max_torque_nm } else { ratings.max_torque_nm };
         let commander = Box::new(move |t_s| request(t_s, torque_nm, ratings));
-        LinePlan { starts_charged: true, ..LinePlan::new(line::scaled(machine), commander) }
+        LinePlan { starts_charged: true, ..LinePlan::new(line::fed(options, machine), commander) }
     }
 }

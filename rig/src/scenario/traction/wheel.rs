@@ -105,9 +105,9 @@ fn stretch(recording: &Recording, (from, until): (f64, f64)) -> Stretch {
 }
 
 impl Scenario<Traction> for Wheel {
-    fn plan(&self, _options: &Options, machine: &Machine) -> Plan {
+    fn plan(&self, options: &Options, machine: &Machine) -> Plan {
         let ratings = &machine.tables.ratings;
-        let mut link = line::scaled(machine);
+        let mut link = line::fed(options, machine);
         link.source.reversible = true;
         let line =
             LinePlan { starts_charged: true, ..LinePlan::new(link, Box::new(|t_s| request(t_s, ratings))) };

@@ -8,7 +8,7 @@ use clap::ValueEnum;
 /// From near standstill to the rated speed at full torque (the paper's machine from 10 to 1,300 r/min), a cruise there, and back.
 #[derive(Clone, Copy, Debug, Args, Serialize)]
 pub struct Cycle {
-    /// Length of the cruise, in s, up to 3600.
+    /// Length of the cruise, in s, from 0.7 to 3600.
     #[arg(long, default_value_t = 20.0, value_parser = cruise_s, allow_negative_numbers = true)]
     cruise: f64,
     /// Motor 2's own cycle.
@@ -60,6 +60,8 @@ const LEAD_S: f64 = 0.2;
 const STEP_S: f64 = 1e-3;
 /// Time left out after the cruise's beginning and before its end, in s: torque and field weakening still change there.
 const SETTLING_S: f64 = 0.3;
+/// Shortest cruise, of which something is left then, in s.
+const LEAST_CRUISE_S: f64 = 0.7;
 
 /// Phase of the cycle in which a motor is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -336,7 +338,8 @@ fn residual_percent(rows: &[Row]) -> f64 {
 }
 
 fn cruise_s(text: &str) -> Result<f64, String> {
-    number(text, "a number above 0, at most 3600", |seconds| seconds > 0.0 && seconds <= 3600.0)
+    let allowed = format!("a number from {LEAST_CRUISE_S} to 3600: a shorter cruise does not settle");
+    number(text, &allowed, |seconds| (LEAST_CRUISE_S..=3600.0).contains(&seconds))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The ZS9's drive that somebody drives by hand for as long as he likes: plant, contactors, operator and drive, stepped from outside.
 
 use super::prelude::*;
-use super::{Controller, Line, Settings, TRACKING_RAD_S, bench};
+use super::{Controller, Line, Settings, TRACKING_RAD_S, bench, machine_name};
 use crate::bench::Simulated;
 use crate::inject::zs9::Kind;
 use crate::options::RunOptions;
@@ -69,7 +69,7 @@ impl Live {
         };
         let bench = bench(plan, &options, machine)?.endless();
         let drive = settings::drive(CLOCK, options.own.carrier_hz, machine.tables);
-        settings::check(&drive, machine)?;
+        settings::check(&drive, machine, machine_name(&options))?;
         let link_ref_v = link_v(&options, machine);
         let ratings = Settings::operator_ratings(&machine.tables.ratings);
         let request = Arc::new(Mutex::new(DualRequest::idle(&ratings, link_ref_v as f32)));

@@ -22,7 +22,7 @@ use crate::inject::Injection;
 use crate::inject::zs9::Kind;
 use crate::law::LawName;
 use crate::machine::Machine;
-use crate::options::{On, positive};
+use crate::options::{On, needs, positive};
 use crate::plant::zs9::{NetworkState, ZNetwork, Zs9Plant, Zs9Settings};
 use crate::plant::{LineFilter, SpeedSource};
 use crate::report::Page;
@@ -33,7 +33,7 @@ use crate::zs9::line::LineTimes;
 use crate::zs9::run::{Tasks, run_in_qemu};
 use crate::zs9::trace::Recording;
 use crate::zs9::{Operator, figures, settings};
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use clap::{Args, Command};
 use core::f64::consts::TAU;
 use serde::Serialize;
@@ -49,6 +49,9 @@ use tractive::wire::DualSetup;
 
 /// Largest source and link voltage that is simulated, as a multiple of the source's nominal one: the drive trips long before.
 const LARGEST: f64 = 3.0;
+
+/// Time that an injected fault is left to show before the run ends, in s.
+const LEFT_S: f64 = 0.02;
 
 /// Two motors on a Z-source nine-switch inverter.
 #[derive(Clone, Copy, Debug)]
@@ -164,11 +167,11 @@ impl System for Zs9 {
         if source_v > largest_v {
             bail!("--udc {source_v}: must be at most {largest_v} V");
         }
-        if !(source_v..=largest_v).contains(&link_ref_v) {
-            bail!("--uin {link_ref_v}: must be from the source's {source_v} V to {largest_v} V");
-        }
+        check_link(link_ref_v, source_v, options, machine)?;
         let link_v = capacitor_v(options, machine);
         options.own.device_drop.unwrap_or_default().check(link_v, machine)?;
+        let has_dead_time = options.own.real || options.dead_time_us > 0.0;
+        needs(&[("--uncompensated", options.own.uncompensated, "--dead-time-us", has_dead_time)])?;
         options.check_flaws(machine, source_v)
     }
 
@@ -201,7 +204,7 @@ impl System for Zs9 {
         });
         let settings = settings::with_dead_time(settings, told_us * 1e-6)
             .behind_line_filter(behind_line_filter, machine.tables);
-        settings::check(&settings, machine)?;
+        settings::check(&settings, machine, machine_name(options))?;
         let (on, law) = options.choice()?;
         match on {
             On::Host => {
@@ -266,10 +269,11 @@ impl OnHost<'_> {
 fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     let Plan { lead_s, duration_s, .. } = plan;
     let Zs9Options { carrier_hz, scheme, inject, .. } = options.own;
-    if let Some(injection) = inject
-        && !(0.0..=duration_s).contains(&injection.at_s)
+    if let Some(Injection { at_s, .. }) = inject
+        && !(0.0..=duration_s - LEFT_S).contains(&at_s)
     {
-        bail!("--inject at {} s: must be within the run, from 0 to {duration_s} s", injection.at_s);
+        let latest_s = duration_s - LEFT_S;
+        bail!("--inject at {at_s} s: must be from 0 to {latest_s:.2} s: the run ends at {duration_s} s");
     }
     let judged_step_s = plan.judged_step_s.unwrap_or(Zs9::trace_step_s(&options.own));
     let written_step_s = options.dt.unwrap_or(judged_step_s);
@@ -306,6 +310,24 @@ fn bench(plan: Plan, options: &Options, machine: &Machine) -> Result<Bench> {
     Ok(if written_step_s == judged_step_s { bench } else { bench.writing_every(written_step_s) })
 }
 
+/// The check that shoot-through can make this link voltage, in V, of the source's, in V. The error names the option, or the machine's file and key.
+fn check_link(link_ref_v: f64, source_v: f64, options: &Options, machine: &Machine) -> Result<()> {
+    let duty = settings::drive(CLOCK, options.own.carrier_hz, machine.tables).link.duty_max;
+    let most_v = (source_v / (1.0 - 2.0 * f64::from(duty))).min(LARGEST * Zs9::source_v(machine));
+    let place = || settings::place(machine, machine_name(options), "zs9_link_v");
+    let name = if options.own.uin.is_some() { "--uin".to_owned() } else { place() + "zs9_link_v" };
+    ensure!(
+        (source_v..=most_v).contains(&link_ref_v),
+        "{name} {link_ref_v}: must be from the source's {source_v} V to {most_v:.0} V, which a shoot-through duty of {duty} makes of it"
+    );
+    Ok(())
+}
+
+/// The machine's name, or its folder.
+fn machine_name(options: &Options) -> &str {
+    options.machine.as_deref().unwrap_or(Zs9::MACHINE)
+}
+
 /// Voltage of the source, in V.
 fn source_v(options: &Options, machine: &Machine) -> f64 {
     options.udc.unwrap_or(Zs9::source_v(machine))
@@ -333,7 +355,8 @@ const RECTIFIER_HZ: f64 = 300.0;
 
 /// Verdicts on figures: the quantity with its unit, the figure's name, the bound. The paper shows curves without numbers. With flaws, or with a
 /// link below the machine's own, figures are only reported, because the link's are farther off there; behind a line filter, those of the link; but a
-/// filter must not swing for ever. If nothing was injected, a figure that never came falls short of any bound.
+/// filter must not swing for ever. If nothing was injected, a figure that never came falls short of any bound; a fault that was injected must be
+/// latched.
 pub fn judge(
     figures: &Figures,
     options: &Options,
@@ -355,7 +378,9 @@ pub fn judge(
         let at_most = if swings { f64::INFINITY } else { 100.0 * MOST_LINK_SWING };
         Verdict::at_most("swing of the source that is left in %", percent, at_most)
     });
-    bounds.iter().map(verdict).chain(swing).collect()
+    let unfelt = figures.get("fault_value").is_none();
+    let injected = options.own.inject.map(|_| Verdict::never("the injected fault had no effect", unfelt));
+    injected.into_iter().chain(bounds.iter().map(verdict)).chain(swing).collect()
 }
 
 /// A speed in rad/s.

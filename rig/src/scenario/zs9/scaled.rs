@@ -35,11 +35,15 @@ pub const LINK_OFF_PERCENT: f64 = 3.0;
 /// Load of the paper's motors before the load of one of them steps, in N·m.
 pub const LOAD_NM: f64 = 60.0;
 
-/// The check that the machine can carry a step of the load, in N·m.
+/// Share of the largest torque that a motor may carry after a step of its load: the rest brings its speed back.
+const CARRIED_SHARE: f64 = 0.95;
+
+/// The check that the machine can carry a step of the load, in N·m, and recover its speed.
 ///
 /// # Errors
 /// Names the option, and what is allowed.
 pub fn check_step(step_nm: f64, machine: &Machine) -> anyhow::Result<()> {
-    let (load_nm, most_nm) = (scaled_nm(LOAD_NM, machine), machine.folder.parameters.max_torque_nm);
+    let load_nm = scaled_nm(LOAD_NM, machine);
+    let most_nm = CARRIED_SHARE * machine.folder.parameters.max_torque_nm;
     within(&[("--step", step_nm, -most_nm - load_nm, most_nm - load_nm)])
 }

@@ -3,7 +3,7 @@
 use super::Bench;
 use crate::bench::{Limits, Observed, Tick};
 use crate::inject::Injection;
-use crate::inject::zs9::{Kind, Spoiler};
+use crate::inject::zs9::{Kind, Levels, Spoiler};
 use crate::plant::Motor;
 use crate::plant::zs9::Source;
 use crate::zs9::trace::{Edge, Row};
@@ -60,16 +60,18 @@ impl Bench {
     pub fn inject(&mut self, kind: Kind) {
         self.mend();
         let from = self.time.now + 1;
-        self.spoiler = Spoiler::new(
-            Some(Injection { kind, at_s: self.time.seconds(from) }),
-            self.plant.motors[0].largest_a,
-        );
+        let injection = Injection { kind, at_s: self.time.seconds(from) };
+        self.spoiler = Spoiler::new(Some(injection), self.levels());
         self.observed = Observed::new(from, Limits::NONE);
+    }
+
+    fn levels(&self) -> Levels {
+        Levels::new(self.plant.motors[0].largest_a, &self.settings.drive.limits)
     }
 
     /// Mends the injected fault; what the drive has latched stays latched.
     pub fn mend(&mut self) {
-        self.spoiler = Spoiler::new(None, self.plant.motors[0].largest_a);
+        self.spoiler = Spoiler::new(None, self.levels());
         self.observed = Observed::new(Tick::MAX, Limits::NONE);
         self.plant.source = Source::Bidirectional;
         self.plant.mend_network();

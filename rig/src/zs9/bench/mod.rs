@@ -24,7 +24,7 @@ use super::line::{LineSide, LineTimes};
 use super::operator::{Operator, Orders};
 use super::trace::Row;
 use crate::bench::{Conversions, Converter, Due, Observed, Tick, Timeline};
-use crate::inject::zs9::Spoiler;
+use crate::inject::zs9::{Levels, Spoiler};
 use crate::plant::zs9::{NetworkState, Zs9Plant};
 use crate::plant::{FilteredLink, LineFilter};
 use gates::Gates;
@@ -80,7 +80,7 @@ impl Bench {
     pub fn new(plant: Zs9Plant, mut operator: Box<dyn Operator + Send>, settings: BenchSettings) -> Self {
         let time = Timeline::new(settings.drive.clock, COMPARE_STEPS, settings.lead_s);
         let speeds = plant.motors.each_ref().map(|motor| motor.speed_rpm());
-        let largest_a = plant.motors[0].largest_a;
+        let levels = Levels::new(plant.motors[0].largest_a, &settings.drive.limits);
         let fault_s = settings.injection.map(|injection| settings.lead_s + injection.at_s);
         Self {
             orders: operator.orders(-settings.lead_s, speeds),
@@ -89,7 +89,7 @@ impl Bench {
             plant,
             operator,
             converter: Converter::new(settings.flaws),
-            spoiler: Spoiler::new(settings.injection, largest_a),
+            spoiler: Spoiler::new(settings.injection, levels),
             course: Course::default(),
             begun: 0,
             period: time.of_ticks(settings.drive.carrier_ticks),

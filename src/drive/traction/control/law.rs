@@ -254,6 +254,8 @@ impl<M: Machine, L: ControlLaw> ControlTask<M, L> {
         self.delay = self.delayed();
         if self.exit.crosses() {
             self.controller.begin_without_torque();
+        } else {
+            self.modulation_index = 0.0;
         }
         self.watch = FrozenWatch::new();
         self.unexplained = UnexplainedWatch::new();

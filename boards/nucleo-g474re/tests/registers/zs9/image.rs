@@ -150,6 +150,11 @@ impl Image {
         if precharge || main {
             self.capacitor_v += (SOURCE_V - self.capacitor_v) * f64::from(CLOCK.control_s()) / PRECHARGE_S;
         }
+        // The shoot-through of the last slot boosts it.
+        let duty = self.shared.operator.observed().map_or(0.0, |observed| f64::from(observed.report.duty));
+        if duty > 0.0 {
+            self.capacitor_v = (1.0 - duty) / (1.0 - 2.0 * duty) * SOURCE_V;
+        }
         let [precharge, main] = self.told.map(|(told, since)| {
             u32::from(since.is_some_and(|since| told == (self.periods >= since + CONTACTOR_PERIODS)))
         });
