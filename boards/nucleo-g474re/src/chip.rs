@@ -115,7 +115,7 @@ pub(super) fn join_bus<T>(
     clock::enable_peripherals(&registers, &mut Cycles);
     match Can::CHIP.configure(messages, &registers.rcc, &mut Cycles) {
         Ok(()) => pins::configure_bus(&registers, of),
-        // Nobody can command the drive then; it stays at rest.
+        // Nobody can command the drive then; it stays at rest. If its watchdog runs already, that starts the chip anew.
         Err(error) => defmt::error!("no bus: {}", error),
     }
     found

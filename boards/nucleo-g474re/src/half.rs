@@ -27,9 +27,10 @@ impl LegCompares {
         Self { fall: if high { NEVER } else { 0 }, rise: NEVER }
     }
 
-    /// A level that toggles `compare_ticks` after the start; at [`NEVER`] and beyond it stays.
-    pub const fn toggling(start_high: bool, compare_ticks: u32) -> Self {
-        let toggle = if compare_ticks < NEVER as u32 { compare_ticks as u16 } else { NEVER };
+    /// A level that toggles `compare_ticks` after the start of a half with so many ticks; at its end and beyond it stays. Leg W's counter may pass the end:
+    /// its reset is a trigger's.
+    pub const fn toggling(start_high: bool, compare_ticks: u32, period_ticks: u32) -> Self {
+        let toggle = if compare_ticks < period_ticks { compare_ticks as u16 } else { NEVER };
         if start_high { Self { fall: toggle, rise: NEVER } } else { Self { fall: 0, rise: toggle } }
     }
 
@@ -58,7 +59,7 @@ impl HalfRegisters {
         if half.mode != Mode::Off {
             let phases = half.start_levels.into_iter().zip(half.compare_ticks);
             for (leg, (start_high, compare_ticks)) in legs.iter_mut().zip(phases) {
-                *leg = LegCompares::toggling(start_high, compare_ticks);
+                *leg = LegCompares::toggling(start_high, compare_ticks, half.period_ticks);
             }
         }
         Self { reload: reload(half.period_ticks), legs }

@@ -47,10 +47,11 @@ impl Legs {
     /// Configures everything except the start of counting: outputs off, all legs low, halves of `reload` + 1 ticks. Call it once after a reset: its
     /// last write locks dead time, break and polarities.
     pub fn configure(&self, prescaler: u16, dead_time: DeadTime, reload: u16) {
-        for timer in [self.tim1, self.tim8] {
+        // TIM8 has no interrupt that an update by its trigger could raise; with URS set, the reset mode makes none, says one page of RM0440.
+        for (timer, interrupts) in [(self.tim1, vals::Urs::COUNTER_ONLY), (self.tim8, vals::Urs::ANY_EVENT)] {
             timer.cr1().write(|w| {
                 w.set_arpe(true);
-                w.set_urs(vals::Urs::COUNTER_ONLY);
+                w.set_urs(interrupts);
                 w.set_ckd(vals::Ckd::from_bits(dead_time.divider));
             });
             timer.psc().write_value(prescaler - 1);

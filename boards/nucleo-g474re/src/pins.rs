@@ -228,6 +228,9 @@ fn configure(registers: &Registers, pin: &Pin) {
         port.bsrr().write(|w| w.set_br(number, true));
     }
     port.pupdr().modify(|w| w.set_pupdr(number, pull));
+    if pin.function == Function::Output {
+        port.ospeedr().modify(|w| w.set_ospeedr(number, Ospeedr::MEDIUM_SPEED));
+    }
     if let Function::Gate(function) | Function::Alternate(function) | Function::Bus(function) = pin.function {
         port.ospeedr().modify(|w| w.set_ospeedr(number, Ospeedr::MEDIUM_SPEED));
         port.afr(number / 8).modify(|w| w.set_afr(number % 8, function));

@@ -37,6 +37,8 @@ pub struct PowerStage {
     pub break_current_a: f32,
     /// Counts of the position sensor per mechanical turn: for an encoder four times its lines, 4 ..= 65,536.
     pub encoder_counts: u32,
+    /// Levels of an encoder's tracks A and B while its index counts, as two bits, 0b00 ..= 0b11.
+    pub encoder_index_ab: u8,
     /// Electrical angle of the d axis at the encoder's index, or where the sensor says 0.
     pub encoder_zero: Angle,
     /// The line side's time constants.

@@ -111,6 +111,21 @@ fn every_key_is_refused_by_name_and_line() {
 }
 
 #[test]
+fn an_index_counts_at_the_state_of_the_tracks_that_is_told() {
+    let with = |text: &str, more: &str| TRACTION.check(&format!("{more}\n{text}"), TRACTION.tables);
+    assert!(TRACTION.check(TRACTION.text, TRACTION.tables).unwrap().contains("encoder_index_ab: 0,"));
+    for (text, index) in [(TRACTION, "0b11"), (ZS9, "3")] {
+        let constant =
+            text.check(&format!("encoder_index_ab = {index}\n{}", text.text), text.tables).unwrap();
+        assert!(constant.contains("encoder_index_ab: 3,"), "{constant}");
+    }
+    let said = with(TRACTION.text, "encoder_index_ab = 4").unwrap_err();
+    assert!(said.contains("encoder_index_ab: 4: must be from 0 to 3: two bits"), "{said}");
+    let said = with(ABSOLUTE, "encoder_index_ab = 0b01").unwrap_err();
+    assert!(said.contains("encoder_index_ab: this sensor has no index"), "{said}");
+}
+
+#[test]
 fn a_known_filter_and_known_drops_are_made_up_for() {
     let with = |more: &str| TRACTION.check(&format!("{more}\n{}", TRACTION.text), TRACTION.tables);
     let constant =
@@ -235,11 +250,11 @@ fn another_machine_is_built_once_the_comparators_suit_it() {
 fn the_control_rate_suits_the_carrier_the_timers_and_the_processor() {
     let said = TRACTION.refused("control_hz", "800");
     assert!(
-        said.starts_with("control_hz: 800: must be from 1000 to 29701: the machine's max_switching_hz"),
+        said.starts_with("control_hz: 800: must be from 1100 to 29701: the machine's max_switching_hz"),
         "{said}"
     );
     assert!(
-        TRACTION.refused("control_hz", "40000").starts_with("control_hz: 40000: must be from 1000 to 29701")
+        TRACTION.refused("control_hz", "40000").starts_with("control_hz: 40000: must be from 1100 to 29701")
     );
     let said = TRACTION.refused("control_hz", "12000");
     assert_eq!(said, "control_hz: 12000: must be a whole part of 170000000 Hz");
@@ -276,7 +291,7 @@ fn a_line_filter_is_a_key_of_the_stage() {
     assert_eq!(settings(false), Gains::DEFAULT);
     let said = TRACTION.check(&text.replace("control_hz = 10000", "control_hz = 40000"), TRACTION.tables);
     let said = said.unwrap_err();
-    assert!(said.contains("control_hz: 40000: must be from 1000 to 28766"), "{said}");
+    assert!(said.contains("control_hz: 40000: must be from 1100 to 28766"), "{said}");
     let constant = ZS9.check(&ZS9.with("behind_line_filter", "true"), ZS9.tables).unwrap();
     assert!(constant.contains("behind_line_filter: true,"), "{constant}");
     let said = ZS9.check(&ZS9.text.replace("behind_line_filter", "# "), ZS9.tables).unwrap_err();

@@ -2,6 +2,8 @@
 //! addresses are those of no real chip. Replace them by your chip's, and keep what each of these functions does.
 
 use crate::machine::BUILT_IN;
+use crate::vectors::Interrupt;
+use cortex_m::peripheral::NVIC;
 use tractive::frames::{Abc, Angle};
 use tractive::modulation::{CarrierHalf, Mode};
 use tractive::operator::{Configuration, Feedback, OperatorPort, Request, Status};
@@ -36,8 +38,6 @@ const FORCE: *mut u32 = 0x4001_0044 as *mut u32;
 const STATUS: *mut u32 = 0x4001_0010 as *mut u32;
 const CONTROL_STATUS: *mut u32 = 0x4000_0010 as *mut u32;
 const CONTROL_COUNT: *const u32 = 0x4000_0024 as *const u32;
-/// The interrupt controller's pending bits.
-const PEND: *mut u32 = 0xE000_E200 as *mut u32;
 /// Levels of the operator's switches: enable, acknowledge; and of the gate drivers' common ready wire.
 const SWITCHES: *const u32 = 0x4002_0010 as *const u32;
 const READY: *const u32 = 0x4002_0014 as *const u32;
@@ -96,11 +96,25 @@ pub fn complete_stores() {
     cortex_m::asm::dsb();
 }
 
-/// Sets up clocks, pins, converters, break inputs and timers, in the order that your chip requires. The gates stay off until a half that pulses.
+/// Priorities of the two interrupts in the interrupt controller: the lower number preempts. Most chips implement the upper four bits.
+const PWM_PRIORITY: u8 = 0x40;
+const CONTROL_PRIORITY: u8 = 0x80;
+
+/// Sets up clocks, pins, converters, break inputs and timers, in the order that your chip requires, then both interrupts. The gates stay off until a half
+/// that pulses.
 pub fn start() {
     gates_off();
     write(DRIVEN, 0);
     write(FORCE, Force::Nothing as u32);
+    // SAFETY: nothing else uses the core's peripherals.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    // SAFETY: both are masked until here, and no code relies on a priority ceiling. Their handlers share only the library's cells and registers.
+    unsafe {
+        core.NVIC.set_priority(Interrupt::Pwm, PWM_PRIORITY);
+        core.NVIC.set_priority(Interrupt::Control, CONTROL_PRIORITY);
+        NVIC::unmask(Interrupt::Pwm);
+        NVIC::unmask(Interrupt::Control);
+    }
 }
 
 /// `true` while all gate drivers are ready.
@@ -115,7 +129,7 @@ impl ControlPort for Board {
     fn begin(&mut self, revises: bool) {
         write(CONTROL_STATUS, 0);
         if revises {
-            write(PEND, 1 << 25);
+            NVIC::pend(Interrupt::Pwm);
             // It has run before anything else is done.
             cortex_m::asm::dsb();
             cortex_m::asm::isb();
@@ -152,7 +166,10 @@ impl ControlPort for Board {
 impl PwmPort for Board {
     fn begin(&mut self) -> bool {
         let boundary = read(STATUS) & 1 != 0;
-        write(STATUS, 0);
+        // Only what has been seen is taken back: a boundary may come between the two accesses.
+        if boundary {
+            write(STATUS, !1);
+        }
         boundary
     }
 

@@ -1,5 +1,23 @@
 //! The chip's interrupts, in the order of their numbers; two of them are used.
 
+use cortex_m::interrupt::InterruptNumber;
+
+/// The interrupts that are used.
+#[derive(Clone, Copy)]
+pub enum Interrupt {
+    /// The PWM timer's.
+    Pwm = 25,
+    /// The control timer's.
+    Control = 28,
+}
+
+// SAFETY: these numbers never change, and each is the place of its handler in the table below.
+unsafe impl InterruptNumber for Interrupt {
+    fn number(self) -> u16 {
+        self as u16
+    }
+}
+
 /// An entry of the vector table.
 #[derive(Clone, Copy)]
 pub union Vector {
@@ -20,7 +38,7 @@ const COUNT: usize = 82;
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [Vector; COUNT] = {
     let mut vectors = [Vector { reserved: 0 }; COUNT];
-    vectors[25] = Vector { handler: TIM1_UP };
-    vectors[28] = Vector { handler: TIM2 };
+    vectors[Interrupt::Pwm as usize] = Vector { handler: TIM1_UP };
+    vectors[Interrupt::Control as usize] = Vector { handler: TIM2 };
     vectors
 };

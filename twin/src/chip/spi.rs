@@ -10,6 +10,7 @@ const CR1: u32 = 0x00;
 const CR2: u32 = 0x04;
 const SR: u32 = 0x08;
 const DR: u32 = 0x0C;
+const CPOL: u32 = 1 << 1;
 const MSTR: u32 = 1 << 2;
 const SPE: u32 = 1 << 6;
 /// SSM and SSI: without both, a master loses its master mode to its own select pin.
@@ -91,8 +92,8 @@ impl Spi {
                 findings.expect(!starts || value & (MSTR | SELECTED) == MSTR | SELECTED, || {
                     "SPI3 is started, and is no master".into()
                 });
-                findings.expect(value & 0b11 == 0, || {
-                    "SPI3: the driver board shifts at the first edge of a clock that rests low".into()
+                findings.expect(value & CPOL == 0, || {
+                    "SPI3: the driver board shifts at the falling edge of a clock that rests low".into()
                 });
                 self.control[0] = value;
             }

@@ -16,6 +16,7 @@ pub struct Keys {
     pub dc_link_range_v: f64,
     pub break_current_a: f64,
     pub encoder_counts: Option<u32>,
+    pub encoder_index_ab: Option<u32>,
     pub encoder_zeros_deg: Vec<f64>,
     pub precharge_s: f64,
     pub behind_line_filter: Option<bool>,

@@ -21,8 +21,8 @@ const RANGE: f64 = 20.0;
 /// The most by which the comparators' current may exceed the machine's trip current: beyond, they protect another machine.
 const BREAK: f64 = 2.0;
 
-/// The slowest control that a drive starts with, in Hz.
-const SLOWEST_CONTROL_HZ: f64 = 1_000.0;
+/// The slowest control, in Hz: after a pause of 1 ms a converter's result may be wrong (errata sheet, 2.7.9).
+const SLOWEST_CONTROL_HZ: f64 = 1_100.0;
 
 /// A machine, and the folder that it was read from.
 pub struct Machine<'a> {
@@ -234,7 +234,13 @@ impl<'a> Stage<'a> {
         ])?;
         if let PositionSensor::Encoder = self.sensor()? {
             let counts = f64::from(self.sensor_counts()?);
-            self.check(&[Bound("encoder_counts", counts, 4.0, 65_536.0, "what the timer counts")])?;
+            let levels = f64::from(self.keys.encoder_index_ab.unwrap_or_default());
+            self.check(&[
+                Bound("encoder_counts", counts, 4.0, 65_536.0, "what the timer counts"),
+                Bound("encoder_index_ab", levels, 0.0, 3.0, "two bits"),
+            ])?;
+        } else if self.keys.encoder_index_ab.is_some() {
+            return Err(self.refuse("encoder_index_ab", "this sensor has no index".to_owned()));
         }
         let zeros = &self.keys.encoder_zeros_deg;
         if zeros.len() != encoders {
@@ -270,6 +276,7 @@ impl<'a> Stage<'a> {
             self.keys;
         let Keys { break_current_a, precharge_s, discharge_s, behind_line_filter, .. } = self.keys;
         let encoder_counts = self.sensor_counts()?;
+        let encoder_index_ab = self.keys.encoder_index_ab.unwrap_or_default();
         let behind_line_filter = behind_line_filter == Some(true);
         let angle_late_s =
             1e-6 * self.keys.angle_late_us.unwrap_or_default() + self.sensor_age_s(control_hz)?;
@@ -281,7 +288,8 @@ impl<'a> Stage<'a> {
             "PowerStage {{\n    control_hz: {control_hz},\n    dead_time_ns: {dead_time_ns},\n    min_pulse_ns: {min_pulse_ns},\n    \
              current_a_per_code: {current_range_a:?} / {HALF_CODES:?},\n    zero_code: {zero_code},\n    \
              zero_tolerance: {zero_tolerance},\n    udc_v_per_code: {dc_link_range_v:?} / {CODES:?},\n    \
-             break_current_a: {break_current_a:?},\n    encoder_counts: {encoder_counts},\n    encoder_zero: {zero},\n    \
+             break_current_a: {break_current_a:?},\n    encoder_counts: {encoder_counts},\n    \
+             encoder_index_ab: {encoder_index_ab},\n    encoder_zero: {zero},\n    \
              line: LineTimes {{ precharge_s: {precharge_s:?}, discharge_s: {discharge_s:?} }},\n    \
              behind_line_filter: {behind_line_filter},\n    \
              angle_late_s: {angle_late_s:?},\n    current_filter_s: {current_filter_s:?},\n    \

@@ -31,15 +31,15 @@ pub(super) const PINS: &[Pin] = &[
     pin(Port::B, 4, Function::Alternate(5), &["SPI1_MISO"], "absolute encoder, data"),
 ];
 
-/// Makes SPI1 a master of words of 16 bits with a clock that rests high; bits are read at its falling edges.
-pub(super) fn configure(registers: &Registers, rate: vals::Br, wait: &mut dyn Wait) {
+/// Makes SPI1 a master of words of 16 bits with a clock that rests high; bits are read at its first edges, which fall, or at its second ones, which rise.
+pub(super) fn configure(registers: &Registers, rate: vals::Br, reads_at: vals::Cpha, wait: &mut dyn Wait) {
     registers.rcc.apb2enr().modify(|w| w.set_spi1en(true));
     wait.microseconds(1);
     registers.spi1.cr2().write(|w| w.set_ds(vals::Ds::BITS16));
     registers.spi1.cr1().write(|w| {
         w.set_mstr(vals::Mstr::MASTER);
         w.set_cpol(vals::Cpol::IDLE_HIGH);
-        w.set_cpha(vals::Cpha::FIRST_EDGE);
+        w.set_cpha(reads_at);
         w.set_br(rate);
         w.set_ssm(true);
         w.set_ssi(true);
@@ -51,7 +51,7 @@ impl<const BITS: u32, const GRAY: bool> Position for Absolute<BITS, GRAY> {
     const PINS: &'static [Pin] = PINS;
 
     fn prepare(registers: &Registers, _stage: &PowerStage, wait: &mut dyn Wait) -> Result<(), StartError> {
-        configure(registers, vals::Br::DIV128, wait);
+        configure(registers, vals::Br::DIV128, vals::Cpha::FIRST_EDGE, wait);
         Ok(())
     }
 

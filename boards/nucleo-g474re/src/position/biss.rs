@@ -3,7 +3,8 @@
 //! At the first falling edge of the clock the encoder latches its position. The line stays high until the second rising edge, is low while the encoder
 //! computes, and then carries, a bit a clock: a high start bit, a control bit, the turns and the position within the turn, the most significant bit
 //! first, an error and a warning bit, both low if set, and an inverted checksum of six bits. Then it is low until the encoder has had 20 µs without a
-//! clock. A frame is 64 clocks at 2.66 MHz, each bit read at the falling edge after the one that put it out, so up to 10 m of cable.
+//! clock. A frame is 64 clocks at 2.66 MHz, each bit read at the rising edge after the one that put it out: cable, transceivers and encoder may take 0.35 µs there
+//! and back, of which 10 m of cable are 0.1 µs.
 //!
 //! As with [`Absolute`](super::Absolute), the control interrupt takes the frame that it began a period ago and begins the next one.
 
@@ -15,7 +16,10 @@ use crate::registers::Registers;
 use crate::start::{StartError, Wait};
 use core::sync::atomic::{AtomicU16, Ordering, fence};
 use stm32_metapac::bdma::{Ch, regs, vals};
-use stm32_metapac::spi::{Spi, vals::Br};
+use stm32_metapac::spi::{
+    Spi,
+    vals::{Br, Cpha},
+};
 use tractive::frames::Angle;
 use tractive::machine::Ratings;
 
@@ -50,7 +54,7 @@ impl<const BITS: u32, const TURNS_BITS: u32> Position for Biss<BITS, TURNS_BITS>
             w.set_dma1en(true);
             w.set_dmamux1en(true);
         });
-        absolute::configure(registers, Br::DIV64, wait);
+        absolute::configure(registers, Br::DIV64, Cpha::SECOND_EDGE, wait);
         for ((channel, request), receives) in CHANNELS.into_iter().zip([true, false]) {
             registers.dmamux1.ccr(channel).write(|w| w.set_dmareq_id(request));
             let channel = registers.dma1.ch(channel);

@@ -72,7 +72,7 @@ impl Encoder {
     }
 
     /// Counts every edge of both tracks, 0 ..= counts − 1 per turn; the index sets it to 0 in either direction. Each `trigger`, the control timer's
-    /// TRGO, captures the count.
+    /// TRGO, captures the count. The index counts at one state of the tracks only.
     pub fn configure(timer: TimGp16, stage: &PowerStage, trigger: vals::Ts) {
         timer.ccmr_input(0).write(|w| {
             for channel in [0, 1] {
@@ -88,7 +88,10 @@ impl Encoder {
             w.set_sms(vals::Sms::ENCODER_MODE_3);
             w.set_etf(vals::FilterValue::FCK_INT_N8);
         });
-        timer.ecr().write(|w| w.set_ie(true));
+        timer.ecr().write(|w| {
+            w.set_ie(true);
+            w.set_ipos(stage.encoder_index_ab);
+        });
         timer.ccer().write(|w| w.set_cce(CAPTURE, true));
         timer.cr1().write(|w| w.set_cen(true));
     }

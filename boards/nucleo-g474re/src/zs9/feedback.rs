@@ -34,12 +34,13 @@ pub struct Feedback {
 }
 
 impl Feedback {
-    /// Master, 16 bits, 21.25 MHz; what it sends goes nowhere.
+    /// Master, 16 bits, 10.6 MHz; each bit is read at the falling edge that ends it, 94 ns after it was put out. What it sends goes nowhere.
     pub fn configure(&self) {
         self.spi.cr2().write(|w| w.set_ds(vals::Ds::BITS16));
         self.spi.cr1().write(|w| {
             w.set_mstr(vals::Mstr::MASTER);
-            w.set_br(vals::Br::DIV8);
+            w.set_cpha(vals::Cpha::SECOND_EDGE);
+            w.set_br(vals::Br::DIV16);
             w.set_ssm(true);
             w.set_ssi(true);
             w.set_spe(true);

@@ -6,9 +6,10 @@ use crate::devices;
 use nucleo_g474re::Control;
 use nucleo_g474re::built_in::traction::BUILT_IN;
 use nucleo_g474re::position::{
-    Absolute, Biss, CHANNELS, FRAME, Position, PositionState, Resolver, checksum, decoded,
+    Absolute, Biss, CHANNELS, Encoder, FRAME, Position, PositionState, Resolver, TIM4_BY_TIM3, checksum,
+    decoded,
 };
-use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE};
+use nucleo_g474re::power_stage::{AdcCode, POWER_STAGE, PowerStage};
 use nucleo_g474re::registers::Registers;
 use std::sync::atomic::Ordering;
 use stm32_metapac::adc::Adc;
@@ -85,7 +86,7 @@ fn a_biss_frame_is_fetched_by_dma_and_checked_by_its_sum() {
     assert_eq!(<Biss<18, 4>>::PINS, Ssi::PINS);
     assert!(registers.rcc.ahb1enr().read().dma1en() && registers.rcc.ahb1enr().read().dmamux1en());
     let (control, words) = (registers.spi1.cr1().read(), registers.spi1.cr2().read());
-    assert_eq!((control.cpol(), control.cpha()), (Cpol::IDLE_HIGH, Cpha::FIRST_EDGE));
+    assert_eq!((control.cpol(), control.cpha()), (Cpol::IDLE_HIGH, Cpha::SECOND_EDGE));
     // 170 MHz / 64: 64 clocks are 24 µs.
     assert_eq!(control.br(), Br::DIV64);
     assert!(words.rxdmaen() && words.txdmaen());
@@ -142,6 +143,12 @@ fn an_encoders_timer_counts_a_turn() {
     assert_eq!(u32::from(timer.arr().read().arr()) + 1, POWER_STAGE.encoder_counts);
     assert_eq!(timer.smcr().read().sms(), Sms::ENCODER_MODE_3);
     assert!(timer.ecr().read().ie() && timer.cr1().read().cen());
+    for encoder_index_ab in [0b00, 0b10, 0b11] {
+        let stage = PowerStage { encoder_index_ab, ..POWER_STAGE };
+        Encoder::configure(timer, &stage, TIM4_BY_TIM3);
+        assert!(timer.ecr().read().ie());
+        assert_eq!(timer.ecr().read().ipos(), encoder_index_ab);
+    }
 }
 
 #[test]

@@ -12,7 +12,7 @@ use nucleo_g474re::zs9::sampling::Zeros;
 use nucleo_g474re::zs9::stage::STAGE;
 use nucleo_g474re::zs9::{CLOCK, Control, Pwm, start};
 use stm32_metapac::adc::regs::Isr;
-use stm32_metapac::spi::vals::{Br, Ds, Mstr};
+use stm32_metapac::spi::vals::{Br, Cpha, Cpol, Ds, Mstr};
 use stm32_metapac::timer::regs::SrGp16;
 use stm32_metapac::timer::vals::Dir;
 use tractive::control::Demand;
@@ -212,13 +212,14 @@ fn two_words_are_what_the_gates_did_and_one_is_nothing() {
     }
 }
 
-/// Master, 16 bits, at an eighth of 170 MHz, with a select line of its own.
+/// Master, 16 bits, at a sixteenth of 170 MHz, a bit read at the edge that ends it, with a select line of its own.
 #[test]
 fn the_driver_board_is_asked_for_two_words_while_it_is_selected() {
     let registers = Model::started().registers;
     let (settings, feedback) = (registers.spi3.cr1().read(), start::feedback(&registers));
     assert_eq!(registers.spi3.cr2().read().ds(), Ds::BITS16);
-    assert_eq!((settings.mstr(), settings.br()), (Mstr::MASTER, Br::DIV8));
+    assert_eq!((settings.mstr(), settings.br()), (Mstr::MASTER, Br::DIV16));
+    assert_eq!((settings.cpol(), settings.cpha()), (Cpol::IDLE_LOW, Cpha::SECOND_EDGE));
     assert!(settings.ssm() && settings.ssi() && settings.spe());
     let written = || take_written(registers.gpioa);
     written();
