@@ -120,3 +120,12 @@ fn the_operator_looks_at_capacitors() {
     let links = Ratings { dc_link_min_v: 360.0, dc_link_max_v: 600.0, dc_link_nominal_v: 500.0, ..*own };
     assert_eq!(Settings::link_range_v(&links), [400.0, 800.0, 600.0]);
 }
+
+/// Of a duty, 5 µs that nobody tells are missing in each carrier period of 100 µs, and two dead times that are told, of 2 µs.
+#[test]
+fn the_least_duty_lacks_what_dead_times_take() {
+    let told = Settings { dead_time_ticks: 50, ..Settings::new(CLOCK, 2_500, &BUILT_IN) };
+    for (duty, least) in [(0.2, 0.11), (0.09, 0.0), (0.05, 0.0)] {
+        assert!((told.least_duty(duty) - least).abs() < 1e-6, "{duty}: {}", told.least_duty(duty));
+    }
+}

@@ -22,25 +22,25 @@ pub enum NetworkFault {
 #[derive(Clone, Copy, Debug)]
 pub struct NetworkSpoiler {
     fault: NetworkFault,
-    /// The capacitor's last sound reading, in V.
-    capacitor_v: f32,
+    /// The capacitor's last sound reading, or else the first one of all, in V.
+    capacitor_v: Option<f32>,
 }
 
 impl NetworkSpoiler {
     /// Sensors that will fail like this.
     pub const fn new(fault: NetworkFault) -> Self {
-        Self { fault, capacitor_v: 0.0 }
+        Self { fault, capacitor_v: None }
     }
 
     /// Readings of the capacitor's and the source's voltage, in V.
     pub fn read(&mut self, broken: bool, capacitor_v: &mut f32, source_v: &mut f32) {
         if !broken {
-            self.capacitor_v = *capacitor_v;
+            self.capacitor_v = Some(*capacitor_v);
             return;
         }
         match self.fault {
             NetworkFault::CapacitorScaled(scale) => *capacitor_v *= scale as f32,
-            NetworkFault::CapacitorFrozen => *capacitor_v = self.capacitor_v,
+            NetworkFault::CapacitorFrozen => *capacitor_v = *self.capacitor_v.get_or_insert(*capacitor_v),
             NetworkFault::SourceScaled(scale) => *source_v *= scale as f32,
             NetworkFault::InductorDead | NetworkFault::InductorReversed | NetworkFault::InductorNotFinite => {
             }
