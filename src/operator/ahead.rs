@@ -10,8 +10,6 @@ const SMOOTH_S: f32 = 0.05;
 const FOLLOWS_S: f32 = 3e-3;
 /// Share of the speed limit, below that limit, over which torque that raises the speed fades.
 const SPEED_SPAN: f32 = 0.05;
-/// Share of the largest speed that is allowed up to which a rotor counts as standing: torque in either direction starts it.
-pub(super) const STANDING_SHARE: f32 = 0.01;
 
 /// A mechanical speed's mean, in rad/s; not a number while it is not known.
 #[derive(Clone, Copy, Debug)]
@@ -48,9 +46,15 @@ impl Ahead {
 }
 
 /// A torque within its limits at a mechanical speed, in N·m, if such a share of motoring is left. At rest it is motoring in either direction.
-pub(super) fn limited_nm(torque_nm: f32, speed: f32, share: f32, limits: &MotorLimits) -> f32 {
+pub(super) fn limited_nm(
+    torque_nm: f32,
+    speed: f32,
+    share: f32,
+    limits: &MotorLimits,
+    ratings: &Ratings,
+) -> f32 {
     let motoring_nm = share * limits.motoring_nm;
-    let stands = speed.abs() < STANDING_SHARE * limits.speed_rad_s && limits.braking_nm < motoring_nm;
+    let stands = speed.abs() < ratings.standing_rad_s() && limits.braking_nm < motoring_nm;
     let braking_nm = if stands { motoring_nm } else { limits.braking_nm };
     if speed < 0.0 {
         limit(torque_nm, -motoring_nm, braking_nm)
@@ -105,7 +109,8 @@ mod tests {
 
     #[test]
     fn a_rotor_at_rest_starts_either_way_as_a_motor() {
-        for (torque_nm, speed, wanted_nm) in [
+        let standing = RATINGS.standing_rad_s();
+        for (torque_nm, share, wanted_nm) in [
             (900.0, 0.9, 600.0),
             (-900.0, 0.9, -600.0),
             (-900.0, 1.0, -400.0),
@@ -114,10 +119,11 @@ mod tests {
             (900.0, -1.1, 400.0),
             (-900.0, -1.1, -600.0),
         ] {
-            assert_eq!(limited_nm(torque_nm, speed, 1.0, &LIMITS), wanted_nm, "{torque_nm} {speed}");
+            let found_nm = limited_nm(torque_nm, share * standing, 1.0, &LIMITS, &RATINGS);
+            assert_eq!(found_nm, wanted_nm, "{torque_nm} {share}");
         }
         let brakes = MotorLimits { motoring_nm: 100.0, ..LIMITS };
-        assert_eq!(limited_nm(-900.0, 0.9, 1.0, &brakes), -400.0, "braking may be more");
-        assert_eq!(limited_nm(900.0, 0.9, 1.0, &brakes), 100.0);
+        assert_eq!(limited_nm(-900.0, 0.9 * standing, 1.0, &brakes, &RATINGS), -400.0, "braking may be more");
+        assert_eq!(limited_nm(900.0, 0.9 * standing, 1.0, &brakes, &RATINGS), 100.0);
     }
 }

@@ -258,7 +258,7 @@ impl Demands for TorqueDemand {
         let motor = MotorLimits { motoring_nm, braking_nm, speed_rad_s };
         let left = self.ahead.left_share(speed, self.given_nm, &motor, ratings);
         let asked_nm = aim.request().map_or(0.0, |request| request.torque_nm);
-        let target_nm = limited_nm(asked_nm, speed, left, &motor);
+        let target_nm = limited_nm(asked_nm, speed, left, &motor, ratings);
         let (link_nm, most) = self.link_and_line(report.udc_v, speed, &limits, settings);
         let held_nm = most.motoring_at_most(link_nm).within(target_nm, speed);
         // What falls with a rising speed falls faster than slew and jerk let the ramp follow.

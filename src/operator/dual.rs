@@ -2,7 +2,7 @@
 //! enabling edge each apply to both.
 
 use super::Orders;
-use super::ahead::{Ahead, STANDING_SHARE, limited_nm};
+use super::ahead::{Ahead, limited_nm};
 use super::demand::Aim;
 use super::set_point::SetPoint;
 use super::{Demands, Levels, Ramp, Rates, Refusal, Seen, Settings};
@@ -132,17 +132,18 @@ impl DemandRamp {
         limits: &MotorLimits,
         (settings, rates): (&Settings, &Rates),
     ) {
+        let ratings = settings.ratings;
         *self = match (wanted, *self) {
             (Wanted::Torque(torque_nm), ramp) => {
                 let (mut ramp, given_nm) = match ramp {
                     Self::Torque(ramp, given_nm) => (ramp, given_nm),
                     Self::Speed(_, holding_nm) => (Ramp::at(holding_nm), holding_nm),
                 };
-                let left = motor.ahead.left_share(motor.speed, given_nm, limits, settings.ratings);
-                ramp.step(limited_nm(torque_nm, motor.speed, left, limits), rates);
+                let left = motor.ahead.left_share(motor.speed, given_nm, limits, ratings);
+                ramp.step(limited_nm(torque_nm, motor.speed, left, limits, ratings), rates);
                 // What falls with a rising speed falls faster than slew and jerk let the ramp follow.
-                let rated = MotorLimits::rated(settings.ratings);
-                Self::Torque(ramp, limited_nm(ramp.torque_nm(), motor.speed, left, &rated))
+                let rated = MotorLimits::rated(ratings);
+                Self::Torque(ramp, limited_nm(ramp.torque_nm(), motor.speed, left, &rated, ratings))
             }
             (Wanted::Speed(target), ramp) => {
                 let (mut point, holding_nm) = match ramp {
@@ -244,7 +245,7 @@ impl Demands for DualDemands {
 
     /// A speed of zero takes a torque while the rotor turns.
     fn asks_torque(request: &DualRequest, report: &DualReport, ratings: &Ratings) -> bool {
-        let turning = STANDING_SHARE * ratings.max_speed_rad_s * ratings.pole_pairs;
+        let turning = ratings.standing_rad_s() * ratings.pole_pairs;
         request.motors.iter().zip(report.omega).any(|(motor, omega)| match motor.wanted {
             Wanted::Torque(torque_nm) => torque_nm != 0.0,
             Wanted::Speed(speed) => speed != 0.0 || omega.abs() > turning,
@@ -364,7 +365,7 @@ mod tests {
     fn either_motor_asks_for_torque() {
         let ratings = &BUILT_IN.ratings;
         let idle = DualRequest::idle(ratings, 600.0);
-        let turning = STANDING_SHARE * ratings.max_speed_rad_s * ratings.pole_pairs;
+        let turning = ratings.standing_rad_s() * ratings.pole_pairs;
         let asks = |motor: usize, wanted, omega| {
             let mut request = idle;
             request.motors[motor].wanted = wanted;

@@ -68,10 +68,6 @@ fn share(x: f32, span: f32) -> f32 {
     if x > KEPT_SHARE * span { x / span } else { KEPT_SHARE }
 }
 
-/// Share of the largest speed below which a machine with torque counts as taking power: 30 r/min of 6,000, where 600 N·m give the reference machine's
-/// shaft what its copper takes, `ω T = k T²`.
-const STANDING_SHARE: f32 = 0.005;
-
 /// Share of a torque that the link's window leaves at least.
 const KEPT_SHARE: f32 = 0.001;
 
@@ -129,7 +125,7 @@ impl Shaper {
         // The limit by the link is not slewed: the link's capacitor fills in milliseconds. A pattern follows torque towards zero at any rate.
         let (lowest, highest) = match input.window {
             Some(window) => {
-                let standing = STANDING_SHARE * ratings.max_speed_rad_s * ratings.pole_pairs;
+                let standing = ratings.standing_rad_s() * ratings.pole_pairs;
                 window.bounds_nm(input.udc_v, largest, input.omega, standing)
             }
             None => (-largest, largest),
@@ -223,9 +219,9 @@ mod tests {
             // Less is what the sensors' noise shows without current.
             assert_eq!(begins_nm(sign * 0.005 * ratings.max_torque_nm, false), 0.0);
         }
-        // On a full link, a two-hundredth of the largest speed decides: 50 electrical rad/s.
+        // On a full link the copper loss decides, of 7,935 W: half of it is 1,000 N·m at 15.87 electrical rad/s.
         let window = LinkWindow { braking_full_v: 1_300.0, braking_none_v: 1_400.0, ..LinkWindow::OPEN };
-        for (omega, given_nm) in [(49.0, -500.0), (-49.0, -500.0), (51.0, 1.0), (-51.0, -500.0)] {
+        for (omega, given_nm) in [(15.8, -500.0), (-15.8, -500.0), (15.9, 1.0), (-15.9, -500.0)] {
             let demand = Demand { torque_nm: -500.0, slew_limited: false };
             let (udc_v, flowing_nm, window) = (1_500.0, 0.0, Some(&window));
             let input =

@@ -74,6 +74,14 @@ impl Ratings {
         self.magnet_flux_wb > 1e-9
     }
 
+    /// Mechanical speed below which a rotor counts as standing, in rad/s: half of that at which the largest torque gives the shaft the copper loss of the
+    /// largest current, `ω T = 1.5 R I²`. Slower, torque in either direction takes power from the link.
+    #[inline]
+    pub const fn standing_rad_s(&self) -> f32 {
+        let copper_w = 1.5 * self.stator_resistance_ohm * self.max_current_a * self.max_current_a;
+        0.5 * copper_w / self.max_torque_nm
+    }
+
     /// A direct-axis current, in A, no lower than the demagnetisation limit.
     #[inline(always)]
     pub(crate) fn kept_id_a(&self, id_a: f32) -> f32 {
