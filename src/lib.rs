@@ -22,7 +22,7 @@
 //! | `built-in` | the module `built_in`: the tables of the machines that `TRACTIVE_MACHINE` and `TRACTIVE_ZS9_MACHINE` name |
 //! | `optimal` | the optimised pulse patterns: their modes and angles |
 //! | `wire` | the module `wire`: the words between an emulated board and the rig |
-//! | `qemu` | what the reference images on QEMU's board need; with the two above |
+//! | `qemu` | what the reference images on QEMU's board need; includes `built-in` and `wire` |
 //!
 //! # Conventions
 //! * Pure steps: `step(&input, &mut state) -> output`, without a clock, a peripheral or a global inside.

@@ -135,7 +135,10 @@ class Sender:
 
 
 class Receiver:
-    """Frames from the drive, judged as the drive judges its own."""
+    """Frames from the drive, judged by CRC and counter.
+
+    After more than two lost frames the next ones are rejected until the counter comes round: after a silence, make a new one.
+    """
 
     def __init__(self, protocol: Protocol | None = None):
         self.protocol = protocol or Protocol()

@@ -118,8 +118,8 @@ impl System for Dual {
 
 /// The port of the control interrupt to a board.
 pub trait ControlPort<S: System = Traction> {
-    /// First call of the interrupt, after a half was revised: takes the timer's flag back. If control `revises` the pulses, the PWM interrupt has
-    /// come in between when this returns.
+    /// First call of every interrupt: clears the timer's flag. If control `revises` the pulses, the new half is ready, and the PWM interrupt has run when
+    /// this returns.
     fn begin(&mut self, _revises: bool) {}
     /// The conversions that the control timer triggered at `now`.
     fn sample(&mut self, now: Instant) -> S::Sample;

@@ -2,7 +2,8 @@
 //! implements the ports, and the tables of the machine in `machine/`.
 //!
 //! The registers in [`board`] are those of an example. What is left to you besides them: the order in which your chip is set up, the break inputs in
-//! hardware and their causes (`Sample::hardware`), and the commands, which here are two switches.
+//! hardware and their causes (`Sample::hardware`), the commands, which here are two switches, and what `ask` says of the enable input and the encoder,
+//! which here are always good.
 #![no_std]
 #![no_main]
 

@@ -27,7 +27,7 @@ pub struct CampaignOptions {
     /// The pulse patterns of the two-level drive above the free carrier; default those of --machine, or the paper's.
     #[arg(long, value_enum)]
     pub patterns: Option<PatternsName>,
-    /// Folder for campaign.csv, summary.json and report.html.
+    /// Folder for campaign.csv and, of the listed faults, summary.json and report.html.
     #[arg(long, default_value = "target/tractive/campaign")]
     pub out: PathBuf,
     /// A document whose generated part is rewritten: the tables of the fast campaign, the totals of the full one, the coverage of the

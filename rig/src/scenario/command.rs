@@ -123,9 +123,6 @@ fn ran<S: System>(choice: &Choice<S>, machine: &Machine, page: &mut Page) -> Res
     if let Some(commit) = crate::platform::commit() {
         page.ran("commit", commit);
     }
-    let flaws =
-        if choice.options.is_ideal() { "none: ideal inverter and sensors" } else { "see the options" };
-    page.ran("flaws", flaws);
     let Value::Object(mut options) = serde_json::to_value(choice.filled(machine))? else { return Ok(()) };
     options.extend(choice.own.clone());
     // Stated above, or off.
