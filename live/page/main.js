@@ -221,9 +221,9 @@ function report() {
   if ($("state-name").textContent !== text) $("state-name").textContent = text;
   $("state").dataset.kind = trip ? "bad" : STATES[name] ?? "";
   if (trip) {
-    const safe = { GatesOff: "gates off", ShortCircuit: "lower devices on", UpperShortCircuit: "upper devices on" }[trip.safe] ?? trip.safe;
+    const safe = { GatesOff: "gates off", ShortCircuit: "lower devices on", UpperShortCircuit: "upper devices on" }[trip.safe];
     const unit = properties.units[trip.fault], of = value => `${figure(value)}${unit ? ` ${unit}` : ""}`, refusal = state.status?.refusal ? ` <span>refused: ${state.status.refusal}</span>` : "";
-    fault(`<b>${trip.fault}</b> <span>value ${of(trip.value)}, limit ${of(trip.limit)}</span> <span>${safe}</span>${refusal} <span>Mend the cause, then acknowledge.</span>`);
+    fault(`<b>${trip.fault}</b> <span>value ${of(trip.value)}, limit ${of(trip.limit)}</span> ${safe ? `<span>${safe}</span>` : ""}${refusal} <span>Mend the cause, then acknowledge.</span>`);
   } else if (memory) fault("");
   if ($("acknowledge").disabled !== !trip) buttons();
 }

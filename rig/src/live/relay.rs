@@ -89,9 +89,9 @@ impl Relay {
         let say = |column: &str| self.system.column(column).map_or("", |place| row[place].as_str());
         let known = |column: &str| Some(say(column)).filter(|word| !word.is_empty());
         let number = |column: &str| known(column).and_then(|word| word.parse::<f64>().ok());
-        let trip = known("fault").map(|fault| {
-            json!({ "fault": fault, "value": number("fault_value"), "limit": number("fault_limit"), "safe": "GatesOff" })
-        });
+        let trip = known("fault").map(
+            |fault| json!({ "fault": fault, "value": number("fault_value"), "limit": number("fault_limit") }),
+        );
         let status = json!({
             "state": say("state"),
             "refusal": self.refused.as_deref().or(known("refusal")),
